@@ -1,0 +1,24 @@
+"""What a renderer returns: linear light and the geometry behind it, pixel by pixel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One camera's image of a scene; row 0 is the top. All arrays float32 unless stated.
+
+    radiance: (H, W, 3) linear sRGB primaries, scene-referred, >= 0, unbounded, noise-free.
+    albedo: (H, W, 3) linear, 0..1. normal: (H, W, 3) unit, camera space (x right, y up, z to the viewer).
+    depth: (H, W) metres along the viewing axis, inf where nothing was hit.
+    object_id: (H, W) int32, index into `scene.objects`; -1 is the background.
+    """
+
+    radiance: np.ndarray
+    albedo: np.ndarray
+    normal: np.ndarray
+    depth: np.ndarray
+    object_id: np.ndarray

@@ -1,0 +1,49 @@
+"""A RAW image: the mosaic, and what one must know to read it.
+
+    x = (DN - black) / (white - black),      Var(x) = k * E(x) + sigma2   per CFA site
+
+Values below black stay negative and nothing is clipped here: a mean over clipped noise is biased, and
+the network would learn the bias.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+CFA_PATTERNS = ("RGGB", "BGGR", "GRBG", "GBRG")
+
+
+@dataclass(frozen=True)
+class NoiseLevel:
+    """`k` and `sigma2` of x in normalised units, one per CFA site.
+
+    Site order is always the packed order R, Gr, Gb, B, whatever the camera's CFA.
+    """
+
+    k: tuple[float, float, float, float]
+    sigma2: tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class Raw:
+    """A Bayer image and its calibration.
+
+    mosaic: (H, W) float32, normalised x, H and W even. cfa: 2x2 pattern read row by row, e.g. "GBRG".
+    black_level, white_level: DN, one pair for all sites.
+    white_balance: gains (r, g, b) with g = 1 that make a grey surface grey in camera RGB
+    (the inverse of DNG `AsShotNeutral`).
+    xyz_to_camera: (3, 3) DNG `ColorMatrix1` for D65, rows R, G, B.
+    iso: 0 where unknown. noise: None where unknown.
+    """
+
+    mosaic: np.ndarray
+    cfa: str
+    black_level: int
+    white_level: int
+    white_balance: tuple[float, float, float]
+    xyz_to_camera: np.ndarray
+    camera: str = "unknown"
+    iso: float = 0.0
+    noise: NoiseLevel | None = None
