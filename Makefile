@@ -1,0 +1,33 @@
+# make demo: set up, then the whole chain on a CPU, ending in an HTML report.
+# make test: set up, then lint, types and tests. make bench: the measurements of bench/.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+
+.PHONY: demo test bench setup clean
+
+demo: setup
+	$(BIN)/fsid demo -o fsid-demo
+
+test: setup
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/pytest
+
+bench: setup
+	for script in bench/*.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done
+
+setup: $(READY)
+
+$(READY): pyproject.toml constraints.txt tools/system-libraries.sh
+	tools/system-libraries.sh
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "FSID needs Python 3.11 or newer: make PYTHON=python3.11 ...")'
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[train,test]'
+	touch $(READY)
+
+clean:
+	rm -rf $(VENV) build dist fsid-demo test-output .pytest_cache .mypy_cache .ruff_cache
