@@ -1,0 +1,142 @@
+"""Settings are frozen dataclasses; a file and `--set` lines are overlays on their defaults.
+
+    settings = defaults <- FILE (YAML) <- key=value, key=value ...
+
+`key` may be dotted (`scene.lights.count=2`) and `value` is YAML. A key that does not exist, or a value of
+the wrong type, is an error that names the key: a typing mistake must not silently train on defaults.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+import cattrs
+import yaml
+
+from fsid.errors import FsidError
+
+T = TypeVar("T")
+
+
+def _strict_int(value: Any, _: type) -> int:
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise ValueError(f"{value!r} is not a whole number")
+    return value
+
+
+def _strict_float(value: Any, _: type) -> float:
+    if isinstance(value, bool):
+        raise ValueError(f"{value!r} is not a number")
+    return float(value)
+
+
+def _strict_bool(value: Any, _: type) -> bool:
+    if not isinstance(value, bool):
+        raise ValueError(f"{value!r} is not true or false")
+    return value
+
+
+def _strict_str(value: Any, _: type) -> str:
+    if not isinstance(value, str):
+        raise ValueError(f"{value!r} is not a text")
+    return value
+
+
+_CONVERTER = cattrs.Converter(forbid_extra_keys=True)
+for _kind, _hook in ((int, _strict_int), (float, _strict_float), (bool, _strict_bool), (str, _strict_str)):
+    _CONVERTER.register_structure_hook(_kind, _hook)
+
+
+def to_plain(settings: Any) -> Any:
+    """Dataclasses and tuples as dicts and lists: what YAML and JSON hold."""
+    plain = _CONVERTER.unstructure(settings)
+
+    def listed(value: Any) -> Any:
+        if isinstance(value, Mapping):
+            return {key: listed(item) for key, item in value.items()}
+        if isinstance(value, tuple | list):
+            return [listed(item) for item in value]
+        return value
+
+    return listed(plain)
+
+
+def from_plain(kind: type[T], plain: Any, *, source: str) -> T:
+    """Rebuild a dataclass; absent keys take their defaults.
+
+    Raises FsidError, naming `source` and the key, for unknown keys, wrong types and values that the
+    dataclass itself refuses.
+    """
+    try:
+        return _CONVERTER.structure(plain, kind)
+    except cattrs.BaseValidationError as error:
+        refusal = _first_refusal(error)
+        reason = str(refusal) if refusal else cattrs.transform_error(error, path="")[0].replace(" @ ", " at ")
+        raise FsidError(f"{source}: {reason}") from None
+
+
+def _first_refusal(error: BaseException) -> FsidError | None:
+    if isinstance(error, FsidError):
+        return error
+    for inner in getattr(error, "exceptions", ()):
+        if found := _first_refusal(inner):
+            return found
+    return None
+
+
+def load_settings(kind: type[T], file: Path | None = None, overrides: Sequence[str] = ()) -> T:
+    """Settings of dataclass `kind` from an optional YAML file and `key=value` overrides."""
+    plain: dict[str, Any] = {}
+    source = "defaults"
+    if file is not None:
+        source = str(file)
+        plain = read_yaml(file)
+    for override in overrides:
+        key, equals, text = override.partition("=")
+        if not equals or not key:
+            raise FsidError(f"--set {override}: expected key=value, for example --set width=1280")
+        _assign(plain, key.split("."), _yaml_value(override, text))
+        source = f"{source} and --set" if file else "--set"
+    return from_plain(kind, plain, source=source)
+
+
+def read_yaml(file: Path) -> dict[str, Any]:
+    """A YAML mapping, loaded safely; FsidError where it is missing, broken or something else."""
+    try:
+        plain = yaml.safe_load(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise FsidError(f"{file}: cannot be read ({error.strerror})") from None
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        line = " ".join(str(error).split())
+        raise FsidError(f"{file}: is not valid YAML ({line})") from None
+    if plain is None:
+        return {}
+    if not isinstance(plain, dict):
+        raise FsidError(f"{file}: expected 'key: value' lines, found {type(plain).__name__}")
+    return plain
+
+
+def save_settings(settings: Any, file: Path) -> None:
+    """Write settings as YAML in the order of their definition, replacing the file atomically."""
+    text = yaml.safe_dump(to_plain(settings), sort_keys=False, default_flow_style=None, width=110)
+    part = file.with_name(file.name + ".part")
+    part.write_text(text, encoding="utf-8")
+    part.replace(file)
+
+
+def _yaml_value(override: str, text: str) -> Any:
+    try:
+        return yaml.safe_load(text)
+    except yaml.YAMLError:
+        raise FsidError(f"--set {override}: the value is not valid YAML") from None
+
+
+def _assign(plain: dict[str, Any], path: list[str], value: Any) -> None:
+    for key in path[:-1]:
+        inner = plain.setdefault(key, {})
+        if not isinstance(inner, dict):
+            raise FsidError(f"--set {'.'.join(path)}: {key} is a single value, not a group of settings")
+        plain = inner
+    plain[path[-1]] = value

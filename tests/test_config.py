@@ -1,0 +1,76 @@
+"""Settings: overlays apply in order, and every mistake is one line that names the key."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+from fsid.config import load_settings, save_settings
+from fsid.errors import FsidError
+
+
+@dataclass(frozen=True)
+class Inner:
+    rate: float = 1.0
+    names: tuple[str, ...] = ("a",)
+
+    def __post_init__(self) -> None:
+        if self.rate < 0:
+            raise FsidError("inner.rate: must not be negative")
+
+
+@dataclass(frozen=True)
+class Outer:
+    count: int = 3
+    wide: bool = False
+    size_m: tuple[float, float] = (1.0, 2.0)
+    inner: Inner = field(default_factory=Inner)
+
+
+def test_later_overlays_win(tmp_path: Path):
+    file = tmp_path / "c.yaml"
+    file.write_text("count: 5\ninner: {rate: 2}\n")
+    got = load_settings(Outer, file, ["inner.rate=1e-3", "inner.names=[x, y]", "wide=true"])
+    assert got == Outer(5, True, (1.0, 2.0), Inner(1e-3, ("x", "y")))
+
+
+def test_saved_settings_load_back(tmp_path: Path):
+    settings = Outer(count=7, inner=Inner(0.5, ("q",)))
+    save_settings(settings, tmp_path / "c.yaml")
+    assert load_settings(Outer, tmp_path / "c.yaml") == settings
+
+
+@pytest.mark.parametrize(
+    ("override", "named"),
+    [
+        ("nonsense=1", "nonsense"),
+        ("inner.nonsense=1", "nonsense"),
+        ("count=2.5", "count"),
+        ("count=yes", "count"),
+        ("wide=1", "wide"),
+        ("inner.rate=fast", "rate"),
+        ("inner.rate=-1", "inner.rate"),
+        ("size_m=[1]", "size_m"),
+        ("count.x=1", "count"),
+        ("count", "count"),
+        ("count=[", "count"),
+    ],
+)
+def test_a_mistake_is_one_line_that_names_the_key(override: str, named: str):
+    with pytest.raises(FsidError) as caught:
+        load_settings(Outer, None, [override])
+    assert named in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("text", ["[1, 2]", "a: [", "!!python/object/apply:os.system ['true']", "\x00"])
+def test_a_broken_file_is_one_line_that_names_it(tmp_path: Path, text: str):
+    file = tmp_path / "broken.yaml"
+    file.write_text(text)
+    with pytest.raises(FsidError, match=r"broken\.yaml"):
+        load_settings(Outer, file)
+
+
+def test_a_missing_file_is_named(tmp_path: Path):
+    with pytest.raises(FsidError, match=r"none\.yaml"):
+        load_settings(Outer, tmp_path / "none.yaml")
