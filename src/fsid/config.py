@@ -8,6 +8,7 @@ the wrong type, is an error that names the key: a typing mistake must not silent
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
@@ -73,8 +74,21 @@ def from_plain(kind: type[T], plain: Any, *, source: str) -> T:
         return _CONVERTER.structure(plain, kind)
     except cattrs.BaseValidationError as error:
         refusal = _first_refusal(error)
-        reason = str(refusal) if refusal else cattrs.transform_error(error, path="")[0].replace(" @ ", " at ")
-        raise FsidError(f"{source}: {reason}") from None
+        raise FsidError(f"{source}: {refusal or _first_reason(error)}") from None
+
+
+def _first_reason(error: cattrs.BaseValidationError) -> str:
+    reason, _, path = cattrs.transform_error(error, path="$", format_exception=_reason)[0].rpartition(" @ ")
+    key = path.removeprefix("$").removeprefix(".")
+    return f"{key}: {reason}" if key else reason
+
+
+def _reason(error: BaseException, kind: type | None) -> str:
+    if isinstance(error, cattrs.ForbiddenExtraKeysError):
+        unknown = ", ".join(sorted(error.extra_fields))
+        known = ", ".join(field.name for field in dataclasses.fields(error.cl))
+        return f"no such key: {unknown} (there are: {known})"
+    return str(error) if isinstance(error, ValueError) else f"expected {getattr(kind, '__name__', kind)}"
 
 
 def _first_refusal(error: BaseException) -> FsidError | None:
