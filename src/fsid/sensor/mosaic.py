@@ -1,0 +1,95 @@
+"""The colour filter array as index arithmetic: which pixel of the 2x2 tile is which colour.
+
+    packed[s, i, j] = mosaic[2 i + row_s, 2 j + column_s],        s = R, Gr, Gb, B
+
+Gr is the green that shares its row with red, Gb the one that shares its row with blue; the two sit on
+different readout columns and differ in gain and noise, so they are never averaged. Every other module
+asks here for a site's place in the tile, and none counts pixels itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from fsid.errors import FsidError
+from fsid.sensor.raw import CFA_PATTERNS, Raw
+
+SITES = ("R", "Gr", "Gb", "B")
+SITE_CHANNEL = (0, 1, 1, 2)  # RGB channel of each packed site
+
+
+def check_cfa(cfa: str, where: str = "cfa") -> str:
+    """Return `cfa` if it is one of the four Bayer patterns; `where` names the file or key in the error."""
+    if cfa not in CFA_PATTERNS:
+        raise FsidError(f"{where}: {cfa!r} is not a Bayer pattern; use one of {', '.join(CFA_PATTERNS)}")
+    return cfa
+
+
+def site_offsets(cfa: str) -> tuple[tuple[int, int], ...]:
+    """(row, column) inside the 2x2 tile of the sites R, Gr, Gb, B."""
+    check_cfa(cfa)
+    red, blue = divmod(cfa.index("R"), 2), divmod(cfa.index("B"), 2)
+    return red, (red[0], 1 - red[1]), (blue[0], 1 - blue[1]), blue
+
+
+def shift_cfa(cfa: str, rows: int, columns: int) -> str:
+    """The pattern seen by an image whose first pixel is pixel (rows, columns) of the pattern `cfa`."""
+    check_cfa(cfa)
+    return "".join(cfa[2 * ((r + rows) % 2) + (c + columns) % 2] for r in (0, 1) for c in (0, 1))
+
+
+def mosaic(rgb: np.ndarray, cfa: str) -> np.ndarray:
+    """Keep of each pixel of `rgb` (H, W, 3), H and W even, the one channel its filter passes: (H, W)."""
+    _check_even(rgb.shape[:2])
+    out = np.empty(rgb.shape[:2], rgb.dtype)
+    for (r, c), channel in zip(site_offsets(cfa), SITE_CHANNEL, strict=True):
+        out[r::2, c::2] = rgb[r::2, c::2, channel]
+    return out
+
+
+def pack(mosaic: np.ndarray, cfa: str) -> np.ndarray:
+    """Mosaic (H, W), H and W even, to its four sites (4, H/2, W/2) in the order R, Gr, Gb, B."""
+    _check_even(mosaic.shape)
+    return np.stack([mosaic[r::2, c::2] for r, c in site_offsets(cfa)])
+
+
+def unpack(packed: np.ndarray, cfa: str) -> np.ndarray:
+    """Inverse of `pack`: (4, H/2, W/2) to (H, W)."""
+    if packed.ndim != 3 or packed.shape[0] != 4:
+        raise FsidError(f"packed RAW has shape {packed.shape}; expected (4, height/2, width/2)")
+    out = np.empty((2 * packed.shape[1], 2 * packed.shape[2]), packed.dtype)
+    for site, (r, c) in zip(packed, site_offsets(cfa), strict=True):
+        out[r::2, c::2] = site
+    return out
+
+
+def bayer_crop(raw: Raw, top: int, left: int, height: int, width: int) -> Raw:
+    """Crop to any pixel offset; the pattern of the result is the one its own first pixel sees.
+
+    Even offsets keep the pattern; an odd one shifts it, which is also how one unifies patterns:
+    `bayer_crop(raw, 0, 1, h, w - 2)` of RGGB is GRBG. height and width even, inside the image.
+    """
+    rows, columns = raw.mosaic.shape
+    _check_even((height, width))
+    if top < 0 or left < 0 or top + height > rows or left + width > columns:
+        raise FsidError(f"crop {width}x{height} at ({left}, {top}) lies outside the {columns}x{rows} image")
+    cut = np.ascontiguousarray(raw.mosaic[top : top + height, left : left + width])
+    return replace(raw, mosaic=cut, cfa=shift_cfa(raw.cfa, top, left))
+
+
+def bayer_flip(raw: Raw, vertical: bool, horizontal: bool) -> Raw:
+    """Mirror the image; no pixel changes its colour, so the pattern of the result is mirrored too.
+
+    Rows stay rows, so Gr stays Gr and the noise level of the image stays true. To keep the pattern of
+    `raw`, crop one pixel off both ends of the mirrored axis (Liu et al. 2019, Bayer-preserving augmentation).
+    """
+    flipped = raw.mosaic[:: -1 if vertical else 1, :: -1 if horizontal else 1]
+    cfa = shift_cfa(raw.cfa, int(vertical), int(horizontal))
+    return replace(raw, mosaic=np.ascontiguousarray(flipped), cfa=cfa)
+
+
+def _check_even(shape: tuple[int, ...]) -> None:
+    if len(shape) != 2 or shape[0] % 2 or shape[1] % 2 or 0 in shape:
+        raise FsidError(f"a Bayer image has an even height and width; got shape {shape}: crop it first")

@@ -1,0 +1,72 @@
+"""The paper's sensor model: shot noise grows with the light, read noise does not.
+
+    y = x + sqrt(k x + sigma2) n,     n ~ N(0, 1),     so Var(y) = k x + sigma2   per CFA site
+
+x is the clean normalised signal. This is the heteroscedastic Gaussian limit of a Poisson count plus
+Gaussian readout (Foi et al. 2008, eq. 5); the result is what reaches the converter: neither rounded nor
+clipped yet.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from fsid.errors import FsidError
+from fsid.sensor.mosaic import site_offsets
+from fsid.sensor.profiles import CameraProfile
+from fsid.sensor.raw import NoiseLevel, Raw
+
+K_JITTER = 0.05  # relative sigma: conversion gain from unit to unit, and vendors' rounding of ISO
+SIGMA2_JITTER = 0.2  # relative sigma: read noise varies more, with temperature and readout mode
+
+
+def variance(x: np.ndarray, level: NoiseLevel, cfa: str | None = None) -> np.ndarray:
+    """Noise variance `k max(x, 0) + sigma2` of the clean signal x, normalised units, same shape, float32.
+
+    x is packed (4, h, w) in the order R, Gr, Gb, B, or a mosaic (H, W) together with its `cfa`.
+    """
+    light = np.maximum(x, 0, dtype=np.float32)
+    sites = list(light) if cfa is None else [light[r::2, c::2] for r, c in site_offsets(cfa)]
+    for site, k, sigma2 in zip(sites, level.k, level.sigma2, strict=True):
+        site *= np.float32(k)
+        site += np.float32(sigma2)
+    return light
+
+
+def add_noise(rng: np.random.Generator, raw: Raw, level: NoiseLevel) -> Raw:
+    """One exposure of the clean `raw`: its mosaic plus noise of `level`, which the result carries.
+
+    Values may fall below 0 and above 1; `quantise` stores them as the camera would.
+    """
+    noise = rng.standard_normal(raw.mosaic.shape, dtype=np.float32)
+    sigma = variance(raw.mosaic, level, raw.cfa)
+    np.sqrt(sigma, out=sigma)
+    noise *= sigma
+    noise += raw.mosaic
+    return replace(raw, mosaic=noise, noise=level)
+
+
+def level_rand(
+    rng: np.random.Generator, profile: CameraProfile, iso_range: tuple[float, float]
+) -> tuple[float, NoiseLevel]:
+    """Draw (ISO, level): ISO log-uniform over `iso_range`, then the profile's level with jitter.
+
+    The jitter is one log-normal factor on k (relative sigma `K_JITTER`) and one on sigma2
+    (`SIGMA2_JITTER`), common to all sites: another unit of the same camera at another temperature.
+    """
+    low, high = iso_range
+    if not 0 < low <= high:
+        raise FsidError(f"iso_range ({low}, {high}): give two ISO values, 0 < low <= high")
+    iso = float(np.exp(rng.uniform(np.log(low), np.log(high))))
+    k_factor, sigma2_factor = np.exp(rng.normal(0.0, (K_JITTER, SIGMA2_JITTER)))
+    level = profile.level(iso)
+    return iso, NoiseLevel(
+        k=_scaled(level.k, float(k_factor)), sigma2=_scaled(level.sigma2, float(sigma2_factor))
+    )
+
+
+def _scaled(values: tuple[float, float, float, float], factor: float) -> tuple[float, float, float, float]:
+    a, b, c, d = values
+    return a * factor, b * factor, c * factor, d * factor

@@ -1,0 +1,198 @@
+"""A camera's noise, by name: `load_profile("pixel6").level(3200)`.
+
+    Var(x) = k x + sigma2,      x = (DN - black) / span,      span = white - black
+
+A profile is one YAML file: the camera's integers (CFA, bits, black and white level) and a list of levels,
+each with `iso`, `k`, `sigma2` (normalised) and the same in DN (`k_dn = k span`, `sigma2_dn = sigma2 span^2`;
+a file written by hand may leave these two out), four values per entry in the order R, Gr, Gb, B. The values
+stand there as measured; `iso_law` turns them into a physical level at any ISO. Own profiles work by path.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib.resources import files
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from fsid.errors import FsidError
+from fsid.sensor.colour import published_matrices
+from fsid.sensor.iso_law import k_at, sigma2_at
+from fsid.sensor.mosaic import check_cfa
+from fsid.sensor.raw import NoiseLevel
+
+ROUNDING_VARIANCE_DN2 = 1 / 12  # of the converter: uniform error of one DN width
+
+_REQUIRED = {"name", "camera", "cfa", "bits", "black_level", "white_level", "levels"}
+_OPTIONAL = {"source", "notes", "xyz_to_camera"}
+_DN_TOLERANCE = 0.01  # k_dn and sigma2_dn repeat k and sigma2; they may differ by rounding only
+
+
+@dataclass(frozen=True)
+class CameraProfile:
+    """What FSID knows of one camera.
+
+    black_level, white_level: DN; bits: of the stored integer. iso: (n,) ascending. k, sigma2: (n, 4) float64,
+    sites R, Gr, Gb, B, normalised units, as measured or published (unphysical sigma2 included; `level` has none).
+    xyz_to_camera: (m, 3, 3) matrices for D65 (DNG `ColorMatrix1`); `colour.colour_rand` blends them.
+    """
+
+    name: str
+    camera: str
+    cfa: str
+    black_level: int
+    white_level: int
+    bits: int
+    iso: tuple[float, ...]
+    k: np.ndarray
+    sigma2: np.ndarray
+    xyz_to_camera: np.ndarray
+    source: str = ""
+    notes: str = ""
+
+    @property
+    def span(self) -> int:
+        """DN from black to white."""
+        return self.white_level - self.black_level
+
+    def level(self, iso: float) -> NoiseLevel:
+        """Noise at any ISO > 0, monotone and continuous in ISO; see `iso_law` for what is believed where."""
+        if not (np.isfinite(iso) and iso > 0):
+            raise FsidError(f"profile {self.name}: ISO {iso} is not a positive number")
+        table_iso = np.asarray(self.iso)
+        k = k_at(iso, table_iso, self.k)
+        sigma2 = sigma2_at(iso, table_iso, self.sigma2, ROUNDING_VARIANCE_DN2 / self.span**2)
+        return NoiseLevel(k=_four(k), sigma2=_four(sigma2))
+
+
+def profile_names() -> tuple[str, ...]:
+    """Names of the built-in profiles, sorted."""
+    folder = files("fsid.sensor") / "profiles"
+    return tuple(sorted(f.name.removesuffix(".yaml") for f in folder.iterdir() if f.name.endswith(".yaml")))
+
+
+def load_profile(name_or_path: str | Path) -> CameraProfile:
+    """A built-in profile by name, or a YAML file by path; FsidError names the file and key that is wrong."""
+    if str(name_or_path) in profile_names():
+        text = (files("fsid.sensor") / "profiles" / f"{name_or_path}.yaml").read_text(encoding="utf-8")
+    else:
+        text = _read(Path(name_or_path))
+    return _parse(text, str(name_or_path))
+
+
+def _read(path: Path) -> str:
+    if not path.is_file():
+        names = ", ".join(profile_names())
+        raise FsidError(f"profile {str(path)!r} is neither a file nor one of the built-in profiles: {names}")
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise FsidError(f"{path}: cannot read this profile as text: {error}") from error
+
+
+def _parse(text: str, where: str) -> CameraProfile:
+    try:
+        data = yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        first_line = str(error).splitlines()[0]
+        raise FsidError(f"{where}: not valid YAML: {first_line}") from error
+    _check_keys(data, where, _REQUIRED, _OPTIONAL)
+    white = _integer(data, "white_level", where, 1, 65535)
+    black = _integer(data, "black_level", where, 0, white - 1)
+    bits = _integer(data, "bits", where, 1, 16)
+    if white >= 2**bits:
+        raise FsidError(f"{where}: white_level {white} does not fit into {bits} bits")
+    iso, k, sigma2 = _levels(data["levels"], where, white - black)
+    return CameraProfile(
+        name=str(data["name"]),
+        camera=str(data["camera"]),
+        cfa=check_cfa(data["cfa"], f"{where}: cfa"),
+        black_level=black,
+        white_level=white,
+        bits=bits,
+        iso=iso,
+        k=k,
+        sigma2=sigma2,
+        xyz_to_camera=_matrices(data, where),
+        source=str(data.get("source", "")),
+        notes=str(data.get("notes", "")),
+    )
+
+
+def _levels(entries: Any, where: str, span: int) -> tuple[tuple[float, ...], np.ndarray, np.ndarray]:
+    if not isinstance(entries, list) or not entries:
+        raise FsidError(f"{where}: levels must be a list with one entry per ISO")
+    iso, k, sigma2 = [], [], []
+    for number, entry in enumerate(entries):
+        here = f"{where}: levels[{number}]"
+        _check_keys(entry, here, {"iso", "k", "sigma2"}, {"k_dn", "sigma2_dn"})
+        iso.append(_number(entry["iso"], f"{here}.iso"))
+        k.append(_site_values(entry, "k", here, span))
+        sigma2.append(_site_values(entry, "sigma2", here, span**2))
+        if min(k[-1]) <= 0:
+            raise FsidError(f"{here}.k: the gain of every site must be positive")
+    if iso[0] <= 0 or any(b <= a for a, b in pairwise(iso)):
+        raise FsidError(f"{where}: levels must be in order of rising, positive iso; got {iso}")
+    return tuple(iso), np.array(k), np.array(sigma2)
+
+
+def _site_values(entry: dict[str, Any], key: str, where: str, unit: float) -> list[float]:
+    """Four values of `key`, checked against `key`_dn = value * unit where that is given."""
+    values = _four_numbers(entry[key], f"{where}.{key}")
+    if f"{key}_dn" in entry:
+        in_dn = _four_numbers(entry[f"{key}_dn"], f"{where}.{key}_dn")
+        if not np.allclose(in_dn, np.multiply(values, unit), rtol=_DN_TOLERANCE, atol=0):
+            raise FsidError(f"{where}.{key}_dn is not {key} x {unit:g}; correct one or remove {key}_dn")
+    return values
+
+
+def _matrices(data: dict[str, Any], where: str) -> np.ndarray:
+    if "xyz_to_camera" not in data:
+        return published_matrices()
+    try:
+        matrices = np.asarray(data["xyz_to_camera"], dtype=np.float64)
+    except (TypeError, ValueError):
+        matrices = np.empty(0)
+    if matrices.ndim != 3 or matrices.shape[1:] != (3, 3) or not np.all(np.isfinite(matrices)):
+        raise FsidError(f"{where}: xyz_to_camera must be a list of 3x3 matrices of numbers")
+    return matrices
+
+
+def _check_keys(data: Any, where: str, required: set[str], optional: set[str]) -> None:
+    if not isinstance(data, dict):
+        raise FsidError(f"{where}: expected `key: value` lines, found {type(data).__name__}")
+    if missing := required - data.keys():
+        raise FsidError(f"{where}: missing key {', '.join(sorted(missing))}")
+    if unknown := data.keys() - required - optional:
+        raise FsidError(
+            f"{where}: unknown key {', '.join(sorted(map(str, unknown)))}; "
+            f"known: {', '.join(sorted(required | optional))}"
+        )
+
+
+def _integer(data: dict[str, Any], key: str, where: str, low: int, high: int) -> int:
+    value = data[key]
+    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+        raise FsidError(f"{where}: {key} must be an integer from {low} to {high}; got {value!r}")
+    return value
+
+
+def _number(value: Any, where: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
+        raise FsidError(f"{where} must be a number; got {value!r} (write 1.0e-05, YAML takes 1e-05 for text)")
+    return float(value)
+
+
+def _four_numbers(values: Any, where: str) -> list[float]:
+    if not isinstance(values, list) or len(values) != 4:
+        raise FsidError(f"{where} must list four numbers, for the sites R, Gr, Gb, B; got {values!r}")
+    return [_number(value, where) for value in values]
+
+
+def _four(values: np.ndarray) -> tuple[float, float, float, float]:
+    a, b, c, d = (float(v) for v in values)
+    return a, b, c, d
