@@ -1,0 +1,23 @@
+"""Everything a scene is made of: name and seed -> mesh, name and variant -> material maps."""
+
+from fsid.assets.maps import MaterialMaps
+from fsid.assets.mesh import Mesh
+from fsid.assets.registry import (
+    MATERIAL_VARIANTS,
+    bake_material,
+    build_mesh,
+    material_families,
+    material_tile_m,
+    mesh_families,
+)
+
+__all__ = [
+    "MATERIAL_VARIANTS",
+    "MaterialMaps",
+    "Mesh",
+    "bake_material",
+    "build_mesh",
+    "material_families",
+    "material_tile_m",
+    "mesh_families",
+]

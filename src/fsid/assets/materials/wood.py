@@ -1,0 +1,82 @@
+"""Wood: planks, burl and turned grain, parquet."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fsid.assets.patterns import axes, edge, level, noise, warp
+from fsid.assets.registry import Layers, material_family
+
+
+def _fibres(rng: np.random.Generator, size: int) -> tuple[np.ndarray, np.ndarray]:
+    """Grain along u: slow colour bands and pores one texel wide."""
+    bands = noise(rng, size, 1.3, low=3, stretch=(14, 1))
+    pores = noise(rng, size, 0.2, low=size / 8, stretch=(40, 1))
+    return bands, pores
+
+
+@material_family("wood_planks", tile_m=1.0, relief_m=0.003)
+def wood_planks(rng: np.random.Generator, variant: int, size: int) -> Layers:
+    """Floor boards along u with staggered ends; each board cut from its own place of the grain."""
+    rows = (6, 8, 10, 16)[variant]
+    u, v = axes(size)
+    row = np.floor(v * rows).astype(int)
+    offset = rng.random(rows)[row]
+    along = (u + offset) % 1.0 * 2
+    board = row * 2 + np.floor(along).astype(int)
+    shade, shift = rng.random(rows * 2), rng.random((rows * 2, 2)).astype(np.float32)
+    bands, pores = _fibres(rng, size)
+    bands = warp(bands, shift[board, 0], shift[board, 1])
+    to_side = np.abs((v * rows) % 1 - 0.5)
+    to_end = np.abs(along % 1 - 0.5) * rows / 2
+    gap = np.maximum(edge(to_side, 0.485, 0.03), edge(to_end, rows / 4 - 0.015, 0.03))
+    return Layers(
+        mix=level(bands + 1.6 * (shade[board] - 0.5)),
+        pattern=0.85 * gap + 0.15 * (1 - gap) * level(pores - 1.2, 0.4),
+        detail=0.5 + 0.05 * pores + 0.15 * (shade[board] - 0.5) - 0.3 * gap,
+        roughness=0.4 + 0.06 * pores + 0.3 * gap,
+        height=(1 - gap) * (0.9 + 0.03 * pores),
+    )
+
+
+@material_family("wood_grain", tile_m=0.5, relief_m=0.0008)
+def wood_grain(rng: np.random.Generator, variant: int, size: int) -> Layers:
+    """One cut of wood: growth rings warped by noise; straight for variant 0, burl for 3."""
+    u, v = axes(size)
+    twist = (0.01, 0.03, 0.08, 0.16)[variant]
+    bend = noise(rng, size, 2.0, high=24, stretch=(4 - variant, 1))
+    ring = (v * (9, 12, 8, 5)[variant] + bend * twist * 12) % 1.0
+    late = ring**3
+    _, pores = _fibres(rng, size)
+    eyes = edge(noise(rng, size, 2.2), 1.9, 0.5) * (variant > 1)
+    return Layers(
+        mix=np.clip(0.75 * late + 0.25 * level(bend), 0, 1),
+        pattern=np.clip(0.8 * eyes + 0.25 * level(pores - 1.4, 0.4), 0, 1),
+        detail=0.5 + 0.055 * pores - 0.06 * (late - 0.3),
+        roughness=0.35 + 0.1 * level(pores),
+        height=0.6 - 0.3 * late + 0.07 * pores,
+    )
+
+
+@material_family("parquet", tile_m=1.2, relief_m=0.002)
+def parquet(rng: np.random.Generator, variant: int, size: int) -> Layers:
+    """Basket-weave parquet: squares of parallel strips that alternate in direction."""
+    squares, strips = (8, 6, 4, 6)[variant], (4, 5, 7, 3)[variant]
+    u, v = axes(size)
+    x, y = u * squares, v * squares
+    ix, iy = np.floor(x).astype(int), np.floor(y).astype(int)
+    flip = (ix + iy) % 2 == 1
+    across = np.where(flip, x % 1, y % 1) * strips
+    strip = (iy * squares + ix) * strips + np.floor(across).astype(int)
+    shade = rng.random(squares * squares * strips)[strip]
+    bands, pores = _fibres(rng, size)
+    bands, pores = np.where(flip, bands.T, bands), np.where(flip, pores.T, pores)
+    to_end = np.maximum(np.abs(x % 1 - 0.5), np.abs(y % 1 - 0.5))
+    gap = np.maximum(edge(np.abs(across % 1 - 0.5), 0.48, 0.05), edge(to_end, 0.495, 0.012))
+    return Layers(
+        mix=level(0.7 * bands + 2.4 * (shade - 0.5)),
+        pattern=0.8 * gap,
+        detail=0.5 + 0.04 * pores + 0.12 * (shade - 0.5) - 0.25 * gap,
+        roughness=0.3 + 0.05 * pores + 0.3 * gap,
+        height=(1 - gap) * (0.85 + 0.1 * shade + 0.02 * pores),
+    )

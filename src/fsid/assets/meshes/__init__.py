@@ -1,0 +1,1 @@
+"""Mesh families, one file per group of household objects; found by `fsid.assets.registry`."""

@@ -1,0 +1,155 @@
+"""Tileable building blocks of textures: everything is periodic on the unit square.
+
+    noise     white noise shaped in frequency: amplitude(f) ~ f^-slope within [low, high] cycles per tile
+    cells     jittered-grid Voronoi: distance to the nearest and second nearest seed, and the cell's own value
+    warp      periodic look-up at displaced coordinates
+    ink       lines, shapes and glyphs drawn with PIL, with anti-aliasing, wrapped at the borders
+
+Frequencies and lengths are in cycles or fractions of a tile, so a family looks alike at every size; the
+highest frequencies are set by the texel, because detail down to one texel is what a denoiser must learn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from PIL import Image, ImageDraw
+from scipy.fft import irfft2, rfft2
+from scipy.ndimage import map_coordinates
+from scipy.special import ndtr
+
+Draw = Callable[[ImageDraw.ImageDraw, float, float], None]
+
+
+def axes(size: int) -> tuple[np.ndarray, np.ndarray]:
+    """u (1, S) and v (S, 1): texel centres in [0, 1), float32, to broadcast against each other."""
+    t = (np.arange(size, dtype=np.float32) + 0.5) / size
+    return t[None, :], t[:, None]
+
+
+def noise(
+    rng: np.random.Generator,
+    size: int,
+    slope: float,
+    low: float = 1.0,
+    high: float = np.inf,
+    stretch: tuple[float, float] = (1.0, 1.0),
+) -> np.ndarray:
+    """(S, S) float32 Gaussian noise, mean 0, variance 1, amplitude ~ f^-slope between low and high.
+
+    low, high: cycles per tile, soft edges. stretch: how many times longer the features are along u and v.
+    """
+    white = rng.standard_normal((size, size), dtype=np.float32)
+    fx = np.arange(size // 2 + 1, dtype=np.float32)[None] * np.float32(stretch[0])
+    fy = (np.fft.fftfreq(size, 1 / size).astype(np.float32) * np.float32(stretch[1]))[:, None]
+    f2 = fx * fx + fy * fy
+    f2[0, 0] = 1.0
+    gain = f2 ** np.float32(-slope / 2)
+    if low > 1.0:
+        gain *= np.exp(-((low * low / f2) ** 2))
+    if np.isfinite(high):
+        gain *= np.exp(-np.minimum((f2 / (high * high)) ** 2, 80))
+    gain[0, 0] = 0.0
+    field = irfft2(rfft2(white) * gain, s=(size, size))
+    return field / (field.std() + 1e-12)
+
+
+def level(field: np.ndarray, softness: float = 1.0) -> np.ndarray:
+    """A mean 0, variance 1 field to [0, 1] by the normal distribution: uniform for softness 1, masks below."""
+    return ndtr(field / np.float32(softness))
+
+
+def edge(field: np.ndarray, at: float | np.ndarray, width: float) -> np.ndarray:
+    """Smooth step of `field` from 0 to 1 over `width` centred on `at`."""
+    t = np.clip((field - at) / width + 0.5, 0.0, 1.0)
+    return t * t * (3 - 2 * t)
+
+
+def warp(field: np.ndarray, du: np.ndarray | float, dv: np.ndarray | float) -> np.ndarray:
+    """`field` looked up at (u + du, v + dv), displacements in fractions of a tile, bilinear, periodic."""
+    size = len(field)
+    u, v = np.meshgrid(np.arange(size, dtype=np.float32), np.arange(size, dtype=np.float32))
+    where = np.stack([(v + np.float32(size) * dv) % size, (u + np.float32(size) * du) % size])
+    return map_coordinates(field, where, order=1, mode="grid-wrap")
+
+
+def cells(
+    rng: np.random.Generator, size: int, count: int, jitter: float = 0.9, shift: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Voronoi cells of a jittered `count` x `count` grid of seeds.
+
+    Returns (near, second, value), (S, S) float32: distances to the two nearest seeds in units of the grid
+    spacing, and a uniform random value of the cell. shift (2, S, S): displaces the look-up, in spacings.
+    """
+    seeds = (0.5 + jitter * (rng.random((count, count, 2)) - 0.5)).astype(np.float32)
+    values = rng.random((count, count), dtype=np.float32)
+    u, v = axes(size)
+    x = np.broadcast_to(u * count, (size, size))
+    y = np.broadcast_to(v * count, (size, size))
+    if shift is not None:
+        x, y = x + shift[0], y + shift[1]
+    ix, iy = np.floor(x).astype(np.int32), np.floor(y).astype(np.int32)
+    x, y = x - ix, y - iy
+    near = np.full((size, size), np.inf, np.float32)
+    second, value = near.copy(), np.zeros_like(near)
+    for oy in (-1, 0, 1):
+        for ox in (-1, 0, 1):
+            flat = (iy + oy) % count * count + (ix + ox) % count
+            dx = x - np.float32(ox) - seeds[..., 0].ravel()[flat]
+            dy = y - np.float32(oy) - seeds[..., 1].ravel()[flat]
+            distance = dx * dx + dy * dy
+            closer = distance < near
+            second = np.where(closer, near, np.minimum(second, distance))
+            value[closer] = values.ravel()[flat[closer]]
+            near = np.where(closer, distance, near)
+    return np.sqrt(near), np.sqrt(second), value
+
+
+def ink(size: int, marks: list[Draw], sharpness: int = 2) -> np.ndarray:
+    """(S, S) float32 in [0, 1]: every mark drawn in white on black at all places where it wraps around.
+
+    A mark is called as mark(draw, x, y) and draws relative to that origin on a canvas of
+    `size * sharpness` pixels a side; the canvas is then averaged down, which anti-aliases the edges.
+    """
+    wide = size * sharpness
+    canvas = Image.new("L", (wide, wide), 0)
+    draw = ImageDraw.Draw(canvas)
+    for mark in marks:
+        for y in (-wide, 0, wide):
+            for x in (-wide, 0, wide):
+                mark(draw, x, y)
+    return np.asarray(canvas.reduce(sharpness), dtype=np.float32) / np.float32(255)
+
+
+def scratches(
+    rng: np.random.Generator,
+    size: int,
+    count: int,
+    length: float,
+    angle_deg: float = 0.0,
+    spread_deg: float = 180.0,
+) -> np.ndarray:
+    """(S, S) float32 in [0, 1]: `count` hair lines about one texel wide, `length` of a tile long on average."""
+    wide = size * 2
+    start = rng.random((count, 2)) * wide
+    angle = np.radians(angle_deg + spread_deg * (rng.random(count) - 0.5))
+    reach = length * rng.exponential(1.0, count).clip(0.05, 3) * wide
+    ends = start + np.c_[np.cos(angle), np.sin(angle)] * reach[:, None]
+    shade = rng.integers(70, 256, count)
+    width = rng.integers(1, 4, count)
+
+    def mark(k: int) -> Draw:
+        def line(draw: ImageDraw.ImageDraw, x: float, y: float) -> None:
+            (x0, y0), (x1, y1) = start[k], ends[k]
+            if (
+                max(x0, x1) + x >= 0
+                and min(x0, x1) + x <= wide
+                and max(y0, y1) + y >= 0
+                and min(y0, y1) + y <= wide
+            ):
+                draw.line((x0 + x, y0 + y, x1 + x, y1 + y), fill=int(shade[k]), width=int(width[k]))
+
+        return line
+
+    return ink(size, [mark(k) for k in range(count)])

@@ -1,0 +1,313 @@
+"""Solid builders: the few shapes that every procedural object is put together from.
+
+    box       rounded box: Minkowski sum of a box and a sphere, p = core + r n, so normals are exact
+    lathe     surface of revolution of a profile (r, z), split into hard edges where it turns sharply
+    sweep     circular tube along a path in a rotation-minimising frame
+    sheet     a grid of points given a thickness, so that both sides carry their own normals
+    ball      icosphere pushed along its directions
+
+Real edges are never perfectly sharp: the bevel of a box catches the highlight that tells the eye (and a
+denoiser) where an edge is. A `Solid` is placed by chaining `.turned().stretched().at()`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from fsid.assets.mesh import Mesh
+
+MIN_AREA_M2 = 1e-10
+"""Triangles smaller than this are dropped: 10 um squared, below anything that a pixel can see."""
+
+
+def rotation_matrix(x_deg: float = 0.0, y_deg: float = 0.0, z_deg: float = 0.0) -> np.ndarray:
+    """(3, 3) rotation Rz Ry Rx, the order of `fsid.scene.Transform`."""
+    (cx, cy, cz), (sx, sy, sz) = (fn(np.radians((x_deg, y_deg, z_deg))) for fn in (np.cos, np.sin))
+    rx = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
+    ry = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+    rz = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
+    return rz @ ry @ rx
+
+
+@dataclass(frozen=True)
+class Solid:
+    """vertices (V, 3) metres, normals (V, 3) unit outward, faces (F, 3) counter-clockwise from outside."""
+
+    vertices: np.ndarray
+    normals: np.ndarray
+    faces: np.ndarray
+
+    def at(self, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Solid:
+        """Moved by (x, y, z) metres."""
+        return Solid(self.vertices + (x, y, z), self.normals, self.faces)
+
+    def turned(self, x_deg: float = 0.0, y_deg: float = 0.0, z_deg: float = 0.0) -> Solid:
+        """Rotated about the origin by Rz Ry Rx."""
+        turn = rotation_matrix(x_deg, y_deg, z_deg).T
+        return Solid(self.vertices @ turn, self.normals @ turn, self.faces)
+
+    def stretched(self, x: float, y: float, z: float) -> Solid:
+        """Scaled per axis by positive factors; normals by the inverse transpose."""
+        normals = self.normals / (x, y, z)
+        return Solid(self.vertices * (x, y, z), normals / _length(normals), self.faces)
+
+
+def join(solids: Sequence[Solid]) -> Solid:
+    """All solids as one, in order."""
+    starts = np.cumsum([0] + [len(s.vertices) for s in solids[:-1]])
+    return Solid(
+        np.concatenate([s.vertices for s in solids]),
+        np.concatenate([s.normals for s in solids]),
+        np.concatenate([s.faces + start for s, start in zip(solids, starts, strict=True)]),
+    )
+
+
+def assemble(parts: Mapping[str, Sequence[Solid]]) -> Mesh:
+    """The named parts as one mesh: base on z = 0, footprint centred, degenerate triangles dropped."""
+    solids = [solid for group in parts.values() for solid in group]
+    whole = join(solids)
+    owner = [index for index, group in enumerate(parts.values()) for _ in group]
+    face_parts = np.repeat(owner, [len(s.faces) for s in solids])
+    low, high = whole.vertices.min(0), whole.vertices.max(0)
+    vertices = (whole.vertices - ((low + high) * (0.5, 0.5, 0) + low * (0, 0, 1))).astype(np.float32)
+    keep = _areas(vertices.astype(np.float64), whole.faces) > MIN_AREA_M2
+    return Mesh(
+        vertices=vertices,
+        normals=whole.normals.astype(np.float32),
+        faces=whole.faces[keep].astype(np.int32),
+        face_parts=face_parts[keep].astype(np.int32),
+        part_names=tuple(parts),
+    )
+
+
+def box(size_x: float, size_y: float, size_z: float, bevel: float = 0.004, steps: int = 2) -> Solid:
+    """Box with rounded edges, footprint centred, base on z = 0. `bevel` is limited to 49 % of a side."""
+    directions, signs, faces = _box_template(steps)
+    half = np.array((size_x, size_y, size_z)) / 2
+    radius = min(bevel, 0.98 * half.min())
+    vertices = signs * (half - radius) + directions * radius
+    return Solid(vertices + (0, 0, half[2]), directions, faces)
+
+
+def lathe(profile: Sequence[Sequence[float]], segments: int = 32, crease_deg: float = 35.0) -> Solid:
+    """Revolve a profile of (radius, z) points, ordered so that the outside is on its right going up."""
+    points = np.asarray(profile, dtype=float)
+    points = points[np.r_[True, np.hypot(*np.diff(points, axis=0).T) > 1e-7]]
+    heading = np.diff(points, axis=0)
+    heading /= _length(heading)
+    bend = np.degrees(np.arccos(np.clip((heading[1:] * heading[:-1]).sum(1), -1, 1)))
+    cuts = [0, *(np.flatnonzero(bend > crease_deg) + 1), len(points) - 1]
+    runs = zip(cuts[:-1], cuts[1:], strict=True)
+    return join([_revolved(points[a : b + 1], heading[a:b], segments) for a, b in runs])
+
+
+def cylinder(radius: float, height: float, bevel: float = 0.003, segments: int = 32) -> Solid:
+    """Upright cylinder with rounded rims, base on z = 0."""
+    return cone(radius, radius, height, bevel, segments)
+
+
+def cone(bottom: float, top: float, height: float, bevel: float = 0.003, segments: int = 32) -> Solid:
+    """Upright truncated cone with rounded rims, base on z = 0."""
+    b = min(bevel, 0.9 * min(bottom, top, height / 2))
+    turn = np.linspace(0, np.pi / 2, 4)
+    lower = np.c_[bottom - b + b * np.sin(turn), b - b * np.cos(turn)]
+    upper = np.c_[top - b + b * np.cos(turn), height - b + b * np.sin(turn)]
+    return lathe([(0, 0), *lower, *upper, (0, height)], segments)
+
+
+def sweep(path: np.ndarray, radius: float | np.ndarray, segments: int = 12, *, closed: bool = False) -> Solid:
+    """Tube of `radius` (scalar or one per point, metres) along `path` (n, 3); open ends get round caps."""
+    radii = np.broadcast_to(np.asarray(radius, dtype=float), (len(path),))
+    if not closed:
+        path, radii = _with_caps(path, radii)
+    tangents = _tangents(path, closed)
+    normals, binormals = _frames(tangents, closed)
+    angle = np.linspace(0, 2 * np.pi, segments, endpoint=False)[:, None]
+    ring = normals[:, None] * np.cos(angle) + binormals[:, None] * np.sin(angle)
+    points = path[:, None] + ring * radii[:, None, None]
+    faces = _grid_faces(len(path), segments, wrap_rows=closed, wrap_cols=True)
+    vertices = points.reshape(-1, 3)
+    return Solid(vertices, smooth_normals(vertices, faces), faces)
+
+
+def sheet(points: np.ndarray, thickness: float) -> Solid:
+    """Thick sheet over a grid `points` (n, m, 3): top, bottom and rim. Top is on the side of d_cols x d_rows."""
+    rows, cols = points.shape[:2]
+    faces = _grid_faces(rows, cols)
+    middle = points.reshape(-1, 3)
+    normals = smooth_normals(middle, faces)
+    lift = normals * thickness / 2
+    index = np.arange(rows * cols).reshape(rows, cols)
+    loop = np.r_[index[0, :-1], index[:-1, -1], index[-1, :0:-1], index[:0:-1, 0]]
+    top, bottom = middle + lift, middle - lift
+    rim = _rim(bottom[loop], top[loop], normals[loop])
+    return join([Solid(top, normals, faces), Solid(bottom, -normals, faces[:, ::-1]), rim])
+
+
+def ball(radii: np.ndarray | float, level: int = 4) -> Solid:
+    """Icosphere of 10 * 4^level + 2 directions (`ball_directions`), each pushed to its radius in metres."""
+    directions, faces = _icosphere(level)
+    vertices = directions * np.broadcast_to(np.asarray(radii, dtype=float), len(directions))[:, None]
+    return Solid(vertices, smooth_normals(vertices, faces), faces)
+
+
+def ball_directions(level: int = 4) -> np.ndarray:
+    """(V, 3) unit directions of the vertices of `ball`."""
+    return _icosphere(level)[0]
+
+
+def copies(solid: Solid, turns: np.ndarray, places: np.ndarray) -> Solid:
+    """One copy per row: rotated and uniformly scaled by `turns` (N, 3, 3), moved to `places` (N, 3)."""
+    vertices = np.einsum("nij,vj->nvi", turns, solid.vertices) + places[:, None]
+    normals = np.einsum("nij,vj->nvi", turns, solid.normals)
+    faces = solid.faces + np.arange(len(turns))[:, None, None] * len(solid.vertices)
+    return Solid(vertices.reshape(-1, 3), (normals / _length(normals)).reshape(-1, 3), faces.reshape(-1, 3))
+
+
+def smooth_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """(V, 3) area-weighted vertex normals of welded triangles."""
+    cross = _cross(vertices, faces)
+    total = np.stack(
+        [np.bincount(faces.T.ravel(), np.tile(cross[:, k], 3), len(vertices)) for k in range(3)], axis=1
+    )
+    return total / np.maximum(_length(total), 1e-30)
+
+
+def _cross(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    return np.cross(b - a, c - a)
+
+
+def _areas(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(_cross(vertices, faces), axis=1) / 2
+
+
+def _length(vectors: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
+def _grid_faces(rows: int, cols: int, *, wrap_rows: bool = False, wrap_cols: bool = False) -> np.ndarray:
+    """Two triangles per cell of a (rows, cols) vertex grid, facing d_cols x d_rows."""
+    i = np.arange(rows if wrap_rows else rows - 1)[:, None]
+    j = np.arange(cols if wrap_cols else cols - 1)[None]
+    a, b = i * cols + j, i * cols + (j + 1) % cols
+    c, d = (i + 1) % rows * cols + (j + 1) % cols, (i + 1) % rows * cols + j
+    return np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3)
+
+
+def _revolved(points: np.ndarray, heading: np.ndarray, segments: int) -> Solid:
+    tangent = np.vstack([heading[:1], heading[1:] + heading[:-1], heading[-1:]])
+    tangent /= _length(tangent)
+    angle = np.linspace(0, 2 * np.pi, segments, endpoint=False)
+    circle = np.stack([np.cos(angle), np.sin(angle), np.ones(segments)], axis=1)
+    vertices = points[:, None, [0, 0, 1]] * circle
+    normals = np.stack([tangent[:, 1], tangent[:, 1], -tangent[:, 0]], axis=1)[:, None] * circle
+    faces = _grid_faces(len(points), segments, wrap_cols=True)
+    return Solid(vertices.reshape(-1, 3), normals.reshape(-1, 3), faces)
+
+
+def _with_caps(path: np.ndarray, radii: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Extend both ends by a quarter circle that closes to (nearly) a point."""
+    turn = np.linspace(0, np.pi / 2, 4)[1:]
+    ends = []
+    for end, inner, radius in ((path[0], path[1], radii[0]), (path[-1], path[-2], radii[-1])):
+        outward = (end - inner) / np.linalg.norm(end - inner)
+        ends.append((end + np.sin(turn)[:, None] * outward * radius, np.maximum(np.cos(turn), 1e-3) * radius))
+    (head, head_r), (tail, tail_r) = ends
+    return np.vstack([head[::-1], path, tail]), np.r_[head_r[::-1], radii, tail_r]
+
+
+def _tangents(path: np.ndarray, closed: bool) -> np.ndarray:
+    if closed:
+        step = np.roll(path, -1, axis=0) - np.roll(path, 1, axis=0)
+    else:
+        step = np.gradient(path, axis=0)
+    return step / _length(step)
+
+
+def _frames(tangents: np.ndarray, closed: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Rotation-minimising normals and binormals; a closed path spreads the leftover twist evenly."""
+    normal = np.cross(tangents[0], np.eye(3)[np.abs(tangents[0]).argmin()])
+    normals = [normal / np.linalg.norm(normal)]
+    steps = [*tangents[1:], tangents[0]] if closed else tangents[1:]
+    for tangent in steps:
+        moved = normals[-1] - tangent * (normals[-1] @ tangent)
+        normals.append(moved / np.sqrt(moved @ moved))
+    frame = np.array(normals[: len(tangents)])
+    other = np.cross(tangents, frame)
+    if closed:
+        leftover = np.arctan2(normals[-1] @ other[0], normals[-1] @ frame[0])
+        angle = -leftover * np.arange(len(tangents))[:, None] / len(tangents)
+        frame, other = (
+            frame * np.cos(angle) + other * np.sin(angle),
+            other * np.cos(angle) - frame * np.sin(angle),
+        )
+    return frame, other
+
+
+def _rim(bottom: np.ndarray, top: np.ndarray, normals: np.ndarray) -> Solid:
+    """The strip that closes a sheet; `bottom` and `top` run once around its border."""
+    along = np.roll(bottom, -1, axis=0) - np.roll(bottom, 1, axis=0)
+    outward = np.cross(along, normals)
+    outward /= np.maximum(_length(outward), 1e-30)
+    faces = _grid_faces(2, len(bottom), wrap_cols=True)
+    return Solid(np.vstack([bottom, top]), np.vstack([outward, outward]), faces)
+
+
+@lru_cache(maxsize=8)
+def _box_template(steps: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Directions on the sphere, signs of the core corner and faces of a rounded unit box."""
+    bend = np.tan(np.linspace(0, np.pi / 4, steps + 1))
+    slope = np.r_[-bend[::-1], bend]
+    side = np.r_[-np.ones(steps + 1), np.ones(steps + 1)]
+    u, v = (grid.ravel() for grid in np.meshgrid(slope, slope))
+    su, sv = (grid.ravel() for grid in np.meshgrid(side, side))
+    one = np.ones_like(u)
+    grid = _grid_faces(len(slope), len(slope))
+    directions, signs, faces = [], [], []
+    for axis in range(3):
+        for sign in (1.0, -1.0):
+            order = [(axis + 1) % 3, (axis + 2) % 3, axis]
+            directions.append(np.stack([u, v, sign * one])[np.argsort(order)].T)
+            signs.append(np.stack([su, sv, sign * one])[np.argsort(order)].T)
+            faces.append((grid if sign > 0 else grid[:, ::-1]) + len(faces) * len(u))
+    out = np.vstack(directions)
+    return out / _length(out), np.vstack(signs), np.vstack(faces)
+
+
+@lru_cache(maxsize=8)
+def _icosphere(level: int) -> tuple[np.ndarray, np.ndarray]:
+    g = (1 + 5**0.5) / 2
+    points = np.array([p for s in (1, -1) for t in (g, -g) for p in ((0, s, t), (s, t, 0), (t, 0, s))], float)
+    gaps = np.linalg.norm(points[:, None] - points[None], axis=-1)
+    near = (gaps > 0) & (gaps < 2.1)
+    faces = np.array(
+        [
+            (a, b, c)
+            for a in range(12)
+            for b in range(a)
+            for c in range(b)
+            if near[a, b] and near[b, c] and near[a, c]
+        ]
+    )
+    flip = np.einsum("fi,fi->f", _cross(points, faces), points[faces[:, 0]]) < 0
+    faces[flip] = faces[flip][:, ::-1]
+    for _ in range(level):
+        points, faces = _split(points, faces)
+    return points / _length(points), faces
+
+
+def _split(points: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Each triangle into four, new points on the sphere."""
+    points = points / _length(points)
+    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+    unique, where = np.unique(edges, axis=0, return_inverse=True)
+    ab, bc, ca = where.reshape(3, -1) + len(points)
+    a, b, c = faces.T
+    middle = points[unique].sum(1)
+    split = np.concatenate([np.stack(t, 1) for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
+    return np.vstack([points, middle / _length(middle)]), split

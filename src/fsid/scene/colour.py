@@ -1,0 +1,90 @@
+"""Colours of lights and surfaces, linear sRGB (D65).
+
+    light    Planck's law through the CIE 1931 observer, luminance 1
+    surface  a point of CIELAB from one of four palette models, clipped into gamut and albedo limits
+
+CIELAB because its distances follow the eye: uniform there is uniform in what an image can show, while
+uniform in RGB is mostly garish. Real photographs are far less colourful than that, hence the other models.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+PALETTES = ("natural", "harmonised", "lab", "grey")
+"""natural: muted, mostly earth, leaf and sky hues. harmonised: one hue per scene. lab: anything in gamut."""
+
+_XYZ_TO_RGB = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
+_WHITE = np.array([0.9505, 1.0, 1.089])
+_NATURAL_HUES_DEG = (62.0, 80.0, 110.0, 262.0, 35.0)
+_NATURAL_SHARES = (0.34, 0.22, 0.18, 0.16, 0.10)
+
+
+def lab_to_rgb(lab: np.ndarray) -> np.ndarray:
+    """CIELAB (..., 3) under D65 to linear sRGB, unclipped (CIE 15:2004; IEC 61966-2-1 primaries)."""
+    level, a, b = np.moveaxis(np.asarray(lab, dtype=float), -1, 0)
+    fy = (level + 16) / 116
+    f = np.stack([fy + a / 500, fy, fy - b / 200], axis=-1)
+    linear = np.where(f > 6 / 29, f**3, 3 * (6 / 29) ** 2 * (f - 4 / 29))
+    return (linear * _WHITE) @ _XYZ_TO_RGB.T
+
+
+def blackbody_rgb(temperature_k: float) -> np.ndarray:
+    """(3,) linear sRGB of a black body, luminance 1, never negative.
+
+    Planck's law summed over 380..780 nm with the multi-lobe fit of the CIE 1931 observer of Wyman, Sloan and
+    Shirley, "Simple Analytic Approximations to the CIE XYZ Color Matching Functions", JCGT 2(2), 2013.
+    """
+    nm = np.arange(380.0, 781.0, 5.0)
+    radiance = nm**-5 / np.expm1(1.4388e7 / (nm * temperature_k))
+
+    def lobe(mean: float, below: float, above: float) -> np.ndarray:
+        return np.exp(-0.5 * ((nm - mean) * np.where(nm < mean, below, above)) ** 2)
+
+    x = (
+        1.056 * lobe(599.8, 0.0264, 0.0323)
+        + 0.362 * lobe(442.0, 0.0624, 0.0374)
+        - 0.065 * lobe(501.1, 0.0490, 0.0382)
+    )
+    y = 0.821 * lobe(568.8, 0.0213, 0.0247) + 0.286 * lobe(530.9, 0.0613, 0.0322)
+    z = 1.217 * lobe(437.0, 0.0845, 0.0278) + 0.681 * lobe(459.0, 0.0385, 0.0725)
+    xyz = np.array([(radiance * curve).sum() for curve in (x, y, z)])
+    rgb = np.clip(_XYZ_TO_RGB @ (xyz / xyz[1]), 0.0, None)
+    return rgb / (rgb @ (0.2126, 0.7152, 0.0722))
+
+
+def lab_rand(rng: np.random.Generator, palette: str, scene_hue_deg: float) -> np.ndarray:
+    """(3,) one CIELAB colour of a palette model of `PALETTES`."""
+    level = rng.uniform(12, 93)
+    if palette == "lab":
+        while True:
+            lab = np.array([rng.uniform(10, 95), *rng.uniform(-75, 75, 2)])
+            if np.all((rgb := lab_to_rgb(lab)) > 0) and np.all(rgb < 1):
+                return lab
+    if palette == "grey":
+        hue, chroma = rng.uniform(0, 360), rng.uniform(0, 5)
+    elif palette == "harmonised":
+        hue, chroma = scene_hue_deg + rng.normal(0, 14), rng.gamma(2.2, 7.0)
+    else:
+        hue = rng.choice(_NATURAL_HUES_DEG, p=_NATURAL_SHARES) + rng.normal(0, 14)
+        chroma = rng.gamma(2.0, 6.5)
+    return np.array([level, *_polar(chroma, hue)])
+
+
+def related_rand(rng: np.random.Generator, lab: np.ndarray) -> np.ndarray:
+    """(3,) CIELAB colour of the same stuff as `lab`: lighter or darker, nearly the same hue."""
+    step = rng.uniform(7, 32) * (1 if rng.random() > (lab[0] - 8) / 86 else -1)
+    return np.array([np.clip(lab[0] + step, 6, 96), *(lab[1:] * rng.uniform(0.6, 1.3) + rng.normal(0, 3, 2))])
+
+
+def albedo_rgb(lab: np.ndarray, low: float, high: float) -> np.ndarray:
+    """(3,) linear albedo of `lab`, desaturated until it is inside the gamut, clipped to [low, high]."""
+    for keep in (1.0, 0.8, 0.6, 0.4, 0.2, 0.0):
+        rgb = lab_to_rgb(lab * (1, keep, keep))
+        if rgb.min() >= 0 and rgb.max() <= 1:
+            break
+    return np.clip(rgb, low, high)
+
+
+def _polar(chroma: float, hue_deg: float) -> tuple[float, float]:
+    return chroma * np.cos(np.radians(hue_deg)), chroma * np.sin(np.radians(hue_deg))

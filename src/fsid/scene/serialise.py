@@ -1,0 +1,71 @@
+"""Scene <-> JSON, exact: scene_from_json(scene_to_json(s)) == s.
+
+The dataclasses of `model.py` are the schema: the reader walks their type hints, so a key that is missing,
+unknown or of the wrong type is an error that names where it is. Floats are written with all their digits.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict, fields, is_dataclass
+from types import GenericAlias
+from typing import Any, get_args, get_origin, get_type_hints
+
+from fsid.errors import FsidError
+from fsid.scene.model import Scene
+
+
+def scene_to_json(scene: Scene) -> str:
+    """The scene as JSON text with sorted keys; the same scene always gives the same text."""
+    return json.dumps(asdict(scene), sort_keys=True, allow_nan=False)
+
+
+def scene_from_json(text: str) -> Scene:
+    """The scene written by `scene_to_json`. Raises FsidError that names the offending key."""
+    try:
+        data = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise FsidError(f"scene JSON: not valid at line {error.lineno}: {error.msg}") from None
+    return _read(Scene, data, "scene")
+
+
+def _read(kind: Any, data: Any, where: str) -> Any:
+    if is_dataclass(kind):
+        return _read_record(kind, data, where)
+    origin, arguments = get_origin(kind), get_args(kind)
+    if origin is tuple:
+        return _read_tuple(arguments, data, where)
+    if origin is dict:
+        _expect(isinstance(data, dict), where, "an object")
+        return {key: _read(arguments[1], value, f"{where}.{key}") for key, value in data.items()}
+    if kind is float:
+        number = isinstance(data, int | float) and not isinstance(data, bool)
+        _expect(number and math.isfinite(data), where, "a finite number")
+        return float(data)
+    _expect(isinstance(data, kind) and not isinstance(data, bool), where, f"of type {kind.__name__}")
+    return data
+
+
+def _read_record(kind: Any, data: Any, where: str) -> Any:
+    _expect(isinstance(data, dict), where, "an object")
+    names = {field.name for field in fields(kind)}
+    for key in sorted(data.keys() - names):
+        raise FsidError(f"scene JSON: unknown key {where}.{key}; remove it")
+    for key in sorted(names - data.keys()):
+        raise FsidError(f"scene JSON: missing key {where}.{key}; add it")
+    hints = get_type_hints(kind)
+    return kind(**{name: _read(hints[name], data[name], f"{where}.{name}") for name in names})
+
+
+def _read_tuple(arguments: tuple[GenericAlias, ...], data: Any, where: str) -> tuple[Any, ...]:
+    _expect(isinstance(data, list), where, "a list")
+    if arguments[-1] is ...:
+        return tuple(_read(arguments[0], item, f"{where}[{i}]") for i, item in enumerate(data))
+    _expect(len(data) == len(arguments), where, f"a list of {len(arguments)}")
+    return tuple(_read(a, d, f"{where}[{i}]") for i, (a, d) in enumerate(zip(arguments, data, strict=True)))
+
+
+def _expect(condition: bool, where: str, what: str) -> None:
+    if not condition:
+        raise FsidError(f"scene JSON: {where} must be {what}")
