@@ -1,9 +1,19 @@
 """The camera: clean light to the RAW file that a named camera would have stored, and back to a picture."""
 
+from fsid.sensor.bare import read_mosaic
+from fsid.sensor.colour import camera_to_srgb_matrix, colour_rand, srgb_to_camera_matrix
+from fsid.sensor.demosaic import demosaic
+from fsid.sensor.develop import develop, develop_linear
+from fsid.sensor.dng import dng_pixel_offset, read_raw, write_dng
+from fsid.sensor.exposure import expose, exposure_rand
 from fsid.sensor.mosaic import bayer_crop, bayer_flip, mosaic, pack, unpack
 from fsid.sensor.noise import add_noise, level_rand, variance
+from fsid.sensor.pairs import clean_from_frame, clean_from_linear, clean_from_photo, noisy_from_clean
 from fsid.sensor.profiles import CameraProfile, load_profile, profile_names
+from fsid.sensor.quantise import clean_levels, from_dn, quantise, to_dn
 from fsid.sensor.raw import CFA_PATTERNS, NoiseLevel, Raw
+from fsid.sensor.tone import srgb_decode, srgb_encode
+from fsid.sensor.unprocess import linear_to_camera, process, unprocess
 
 __all__ = [
     "CFA_PATTERNS",
@@ -13,11 +23,36 @@ __all__ = [
     "add_noise",
     "bayer_crop",
     "bayer_flip",
+    "camera_to_srgb_matrix",
+    "clean_from_frame",
+    "clean_from_linear",
+    "clean_from_photo",
+    "clean_levels",
+    "colour_rand",
+    "demosaic",
+    "develop",
+    "develop_linear",
+    "dng_pixel_offset",
+    "expose",
+    "exposure_rand",
+    "from_dn",
     "level_rand",
+    "linear_to_camera",
     "load_profile",
     "mosaic",
+    "noisy_from_clean",
     "pack",
+    "process",
     "profile_names",
+    "quantise",
+    "read_mosaic",
+    "read_raw",
+    "srgb_decode",
+    "srgb_encode",
+    "srgb_to_camera_matrix",
+    "to_dn",
     "unpack",
+    "unprocess",
     "variance",
+    "write_dng",
 ]

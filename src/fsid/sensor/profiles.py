@@ -37,7 +37,8 @@ class CameraProfile:
     """What FSID knows of one camera.
 
     black_level, white_level: DN; bits: of the stored integer. iso: (n,) ascending. k, sigma2: (n, 4) float64,
-    sites R, Gr, Gb, B, normalised units, as measured or published (unphysical sigma2 included; `level` has none).
+    sites R, Gr, Gb, B, normalised units, as measured or published; sigma2 may be impossible here, but not in
+    what `level` returns.
     xyz_to_camera: (m, 3, 3) matrices for D65 (DNG `ColorMatrix1`); `colour.colour_rand` blends them.
     """
 

@@ -1,0 +1,96 @@
+"""A mosaic without metadata: the caller says what the camera would have written beside it.
+
+    .raw .bin   uint16 little endian, row by row, no header (`width` and `height` needed)
+    .npy        integers (H, W), or packed (H/2, W/2, 4) in the order R, Gr, Gb, B
+    .png .tif   16-bit (or 8-bit), one channel
+
+The values are DN; `x = (DN - black_level) / (white_level - black_level)` as everywhere.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import tifffile
+from PIL import Image, UnidentifiedImageError
+
+from fsid.errors import FsidError
+from fsid.sensor.colour import published_matrices
+from fsid.sensor.mosaic import check_cfa, unpack
+from fsid.sensor.quantise import check_levels, from_dn
+from fsid.sensor.raw import Raw
+
+
+def read_mosaic(
+    path: str | Path,
+    *,
+    cfa: str,
+    black_level: int,
+    white_level: int,
+    width: int | None = None,
+    height: int | None = None,
+    white_balance: tuple[float, float, float] = (1.0, 1.0, 1.0),
+    xyz_to_camera: np.ndarray | None = None,
+    camera: str = "unknown",
+    iso: float = 0.0,
+) -> Raw:
+    """The mosaic file at `path` as `Raw`; an odd last row or column is dropped.
+
+    width, height: pixels, needed for .raw and .bin, checked for the others where given. black_level,
+    white_level: DN. xyz_to_camera: the mean of the published matrices where None. FsidError: missing or
+    unreadable file, wrong size, not integers, values above 16 bits.
+    """
+    path = Path(path)
+    check_cfa(cfa, f"{path}: cfa")
+    check_levels(black_level, white_level, str(path))
+    if not path.is_file():
+        raise FsidError(f"{path}: no such mosaic file")
+    dn = _read(path, cfa, width, height)
+    if dn.ndim != 2 or min(dn.shape) < 2:
+        raise FsidError(f"{path}: holds an array of shape {dn.shape}, not a mosaic (height, width)")
+    if dn.dtype.kind not in "ui" or dn.max() > 65535:
+        raise FsidError(f"{path}: holds {dn.dtype} values; a mosaic holds DN as integers up to 65535")
+    if (height or dn.shape[0], width or dn.shape[1]) != dn.shape:
+        raise FsidError(f"{path}: is {dn.shape[1]}x{dn.shape[0]}, not {width}x{height}; correct the size")
+    return Raw(
+        mosaic=from_dn(dn[: dn.shape[0] // 2 * 2, : dn.shape[1] // 2 * 2], black_level, white_level),
+        cfa=cfa,
+        black_level=black_level,
+        white_level=white_level,
+        white_balance=white_balance,
+        xyz_to_camera=published_matrices().mean(axis=0) if xyz_to_camera is None else xyz_to_camera,
+        camera=camera,
+        iso=iso,
+    )
+
+
+def _read(path: Path, cfa: str, width: int | None, height: int | None) -> np.ndarray:
+    kind = path.suffix.lower()
+    if kind in (".raw", ".bin"):
+        return _read_headerless(path, width, height)
+    try:
+        if kind == ".npy":
+            array = np.load(path, allow_pickle=False)
+            packed = array.ndim == 3 and array.shape[2] == 4
+            return unpack(np.moveaxis(array, 2, 0), cfa) if packed else array
+        if kind == ".png":
+            with Image.open(path) as image:
+                return np.asarray(image)
+        if kind in (".tif", ".tiff"):
+            return tifffile.imread(path)
+    except (OSError, ValueError, UnidentifiedImageError, tifffile.TiffFileError) as error:
+        raise FsidError(f"{path}: cannot read this {kind} file: {error}") from error
+    raise FsidError(f"{path}: unknown kind of mosaic file; use .raw, .bin, .npy, .png or .tif")
+
+
+def _read_headerless(path: Path, width: int | None, height: int | None) -> np.ndarray:
+    if not width or not height:
+        raise FsidError(f"{path}: a headerless mosaic needs its width and height")
+    expected, found = 2 * width * height, path.stat().st_size
+    if found != expected:
+        raise FsidError(
+            f"{path}: {width}x{height} uint16 pixels are {expected} bytes, the file has {found}; "
+            f"correct width and height"
+        )
+    return np.fromfile(path, dtype="<u2").reshape(height, width)

@@ -1,0 +1,34 @@
+"""RAW to picture, the plain way: the same for every image, so that pictures can be compared.
+
+    srgb = e(CCM demosaic(min(white_balance x, saturation)))
+
+White balance comes before demosaicing (the interpolation mixes colours and wants them alike) and is followed
+by a clip at the level that every channel can reach, so that a saturated highlight is white and not pink.
+Nothing is clipped at black before the last step: noise below black must average out, not brighten shadows.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fsid.sensor.colour import apply_matrix, camera_to_srgb_matrix
+from fsid.sensor.demosaic import demosaic
+from fsid.sensor.mosaic import SITE_CHANNEL, site_offsets
+from fsid.sensor.raw import Raw
+from fsid.sensor.tone import srgb_encode
+
+
+def develop(raw: Raw) -> np.ndarray:
+    """Picture (H, W, 3) float32, sRGB-encoded 0..1, of a RAW of at least 4x4 pixels. No tone curve."""
+    return srgb_encode(develop_linear(raw))
+
+
+def develop_linear(raw: Raw) -> np.ndarray:
+    """Linear sRGB (H, W, 3) float32; 1 is sensor saturation, values below 0 and above 1 are kept."""
+    gains = np.asarray(raw.white_balance, np.float32) / np.float32(min(raw.white_balance))
+    balanced = raw.mosaic.astype(np.float32)
+    for (r, c), channel in zip(site_offsets(raw.cfa), SITE_CHANNEL, strict=True):
+        balanced[r::2, c::2] *= gains[channel]
+    np.minimum(balanced, 1, out=balanced)
+    camera = demosaic(balanced, raw.cfa)
+    return apply_matrix(camera_to_srgb_matrix(raw.xyz_to_camera), camera)

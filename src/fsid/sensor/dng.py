@@ -1,0 +1,170 @@
+"""RAW files: writes CFA DNG, reads every Bayer file that LibRaw opens.
+
+    DN = round(black + x (white - black)) as uint16, one uncompressed strip, little endian
+
+One strip without compression costs disk and buys that a loader can map the pixels of a sample straight out of
+a tar shard. The same image gives the same bytes: no clock, no software version. Tags are in `dng_tags`.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+import rawpy
+import tifffile
+
+from fsid.errors import FsidError
+from fsid.sensor import dng_tags
+from fsid.sensor.colour import published_matrices
+from fsid.sensor.mosaic import CFA_PATTERNS, site_offsets
+from fsid.sensor.quantise import from_dn, to_dn
+from fsid.sensor.raw import Raw
+from fsid.sensor.tiff import Directory, image_tags, tiff_bytes
+
+_FULL_IMAGE, _REDUCED_IMAGE = 0, 1  # TIFF NewSubfileType
+_RGB, _CFA = 2, 32803  # TIFF PhotometricInterpretation
+
+
+def write_dng(target: str | Path | BinaryIO, raw: Raw, preview: np.ndarray | None = None) -> None:
+    """Write `raw` as DNG to a path (whole or not at all) or to a binary file.
+
+    preview: (h, w, 3) uint8 sRGB, stored as the image that file managers show. Values outside the camera's
+    0..white_level are clipped as the camera would.
+    """
+    data = _dng_bytes(raw, preview)
+    if not isinstance(target, str | Path):
+        target.write(data)
+        return
+    path = Path(target)
+    part = path.with_name(path.name + ".part")
+    try:
+        part.write_bytes(data)
+        os.replace(part, path)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise FsidError(f"{path}: cannot write this DNG: {error.strerror}") from error
+
+
+def dng_pixel_offset(dng: str | Path | BinaryIO) -> int:
+    """Byte offset of the mosaic, (H, W) little-endian uint16, in a DNG written by `write_dng`."""
+    try:
+        with tifffile.TiffFile(dng) as tiff:
+            return int(_mosaic_page(tiff).dataoffsets[0])
+    except (tifffile.TiffFileError, IndexError) as error:
+        raise FsidError(f"{getattr(dng, 'name', dng)}: not a DNG file") from error
+
+
+def read_raw(path: str | Path) -> Raw:
+    """Any Bayer RAW file as `Raw`: visible area, even size, levels, CFA of its first pixel, colour, noise.
+
+    Black levels that differ between sites are subtracted each; `black_level` is their rounded mean. Unknown
+    colour becomes the mean of the published matrices, unknown white balance (1, 1, 1), unknown ISO 0.
+    FsidError: missing, truncated, no RAW, not Bayer (X-Trans, Foveon, linear DNG, monochrome).
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise FsidError(f"{path}: no such RAW file")
+    tags = _read_tags(path)
+    try:
+        with rawpy.imread(str(path)) as file:
+            return _from_libraw(file, tags, path)
+    except (rawpy.LibRawError, rawpy.NotSupportedError) as error:
+        reason = error.args[0].decode() if error.args and isinstance(error.args[0], bytes) else error
+        raise FsidError(f"{path}: not a RAW file that LibRaw can read ({reason})") from error
+
+
+def _dng_bytes(raw: Raw, preview: np.ndarray | None) -> bytes:
+    dn = to_dn(raw)
+    mosaic_tags = image_tags(dn, _CFA, _FULL_IMAGE) + dng_tags.mosaic_tags(raw)
+    exif_tags = dng_tags.exif_tags(raw)
+    exif = ((dng_tags.EXIF_IFD, Directory(exif_tags)),) if exif_tags else ()
+    if preview is None:
+        return tiff_bytes(Directory(mosaic_tags + dng_tags.camera_tags(raw), dn, exif))
+    if preview.ndim != 3 or preview.shape[2] != 3 or preview.dtype != np.uint8:
+        raise FsidError(f"a DNG preview must be (h, w, 3) uint8; got {preview.shape} {preview.dtype}")
+    mosaic = (dng_tags.SUB_IFD, Directory(mosaic_tags, dn))
+    first = image_tags(preview, _RGB, _REDUCED_IMAGE) + dng_tags.camera_tags(raw)
+    return tiff_bytes(Directory(first, preview, (mosaic, *exif)))
+
+
+def _mosaic_page(tiff: tifffile.TiffFile) -> tifffile.TiffPage:
+    """The directory with the CFA image: the first one of a file, or a sub-directory of it."""
+    first = tiff.pages.first
+    for page in (first, *(first.pages or ())):
+        if page.photometric == tifffile.PHOTOMETRIC.CFA:
+            return page
+    return first
+
+
+def _read_tags(path: Path) -> dict[int, Any]:
+    """Tags of the first and the mosaic directory of a TIFF-based RAW, {} for other formats."""
+    try:
+        with tifffile.TiffFile(path) as tiff:
+            page = _mosaic_page(tiff)
+            tags = {t.code: t.value for p in (tiff.pages.first, page) for t in p.tags}
+            ends = [o + n for o, n in zip(page.dataoffsets, page.databytecounts, strict=False)]
+    except (tifffile.TiffFileError, IndexError, ValueError, KeyError, TypeError, AttributeError):
+        return {}
+    if max(ends, default=0) > path.stat().st_size:
+        raise FsidError(f"{path}: truncated, its pixels end after {path.stat().st_size} bytes; copy it again")
+    return tags
+
+
+def _from_libraw(file: rawpy.RawPy, tags: dict[int, Any], path: Path) -> Raw:
+    cfa = _cfa(file, path)
+    tile = file.raw_colors_visible[:2, :2]
+    dn = file.raw_image_visible
+    dn = dn[: dn.shape[0] - dn.shape[0] % 2, : dn.shape[1] - dn.shape[1] % 2]
+    blacks = np.asarray(file.black_level_per_channel, np.float64)
+    black, white = round(float(blacks.mean())), int(file.white_level)
+    if not 0 <= black < white:
+        raise FsidError(f"{path}: black level {black} is not below white level {white}")
+    mosaic = from_dn(dn, black, white)
+    for r, c in site_offsets(cfa):
+        mosaic[r::2, c::2] -= np.float32((blacks[tile[r, c]] - black) / (white - black))
+    return Raw(
+        mosaic=mosaic,
+        cfa=cfa,
+        black_level=black,
+        white_level=white,
+        white_balance=_white_balance(file),
+        xyz_to_camera=_xyz_to_camera(file, tags),
+        camera=_camera(tags),
+        iso=dng_tags.iso_speed(tags),
+        noise=dng_tags.noise_level(tags),
+    )
+
+
+def _cfa(file: rawpy.RawPy, path: Path) -> str:
+    if file.raw_type != rawpy.RawType.Flat or file.num_colors != 3 or file.raw_pattern is None:
+        raise FsidError(f"{path}: has no Bayer mosaic (linear, Foveon or monochrome); FSID needs a Bayer RAW")
+    if file.raw_pattern.shape != (2, 2):
+        raise FsidError(f"{path}: is an X-Trans RAW; FSID needs a Bayer RAW")
+    names = file.color_desc.decode("ascii")
+    cfa = "".join(names[i] for i in file.raw_colors_visible[:2, :2].ravel())
+    if cfa not in CFA_PATTERNS:
+        raise FsidError(f"{path}: its filter pattern {cfa} is not Bayer; FSID needs a Bayer RAW")
+    return cfa
+
+
+def _white_balance(file: rawpy.RawPy) -> tuple[float, float, float]:
+    for gains in (file.camera_whitebalance, file.daylight_whitebalance):
+        if min(gains[:3]) > 0:
+            return gains[0] / gains[1], 1.0, gains[2] / gains[1]
+    return 1.0, 1.0, 1.0
+
+
+def _xyz_to_camera(file: rawpy.RawPy, tags: dict[int, Any]) -> np.ndarray:
+    matrix = dng_tags.d65_matrix(tags)
+    if matrix is None:
+        matrix = np.asarray(file.rgb_xyz_matrix[:3], np.float64)
+    return matrix if np.any(matrix) else published_matrices().mean(axis=0)
+
+
+def _camera(tags: dict[int, Any]) -> str:
+    if dng_tags.UNIQUE_CAMERA_MODEL in tags:
+        return str(tags[dng_tags.UNIQUE_CAMERA_MODEL])
+    return " ".join(str(tags[c]) for c in (dng_tags.MAKE, dng_tags.MODEL) if c in tags) or "unknown"

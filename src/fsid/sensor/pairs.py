@@ -1,0 +1,76 @@
+"""A clean RAW and the noisy one that the camera would have stored.
+
+    frame or photo -> camera RGB in 0..1 -> mosaic = clean,     noisy = Q(clean + sqrt(k clean + sigma2) n)
+
+Q rounds and clips like the camera. Colour, exposure and noise are drawn here, from the generator that the
+caller gives. The clean image is neither rounded nor noisy.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from fsid.render.frame import Frame
+from fsid.sensor.colour import colour_rand
+from fsid.sensor.exposure import expose
+from fsid.sensor.mosaic import mosaic
+from fsid.sensor.noise import add_noise
+from fsid.sensor.profiles import CameraProfile
+from fsid.sensor.quantise import quantise
+from fsid.sensor.raw import NoiseLevel, Raw
+from fsid.sensor.unprocess import check_srgb, linear_to_camera, unprocess
+
+PHOTO_EXPOSURE_MEAN = 0.8  # Brooks et al. 2019: brightness gain is 1 / N(0.8, 0.1)
+PHOTO_EXPOSURE_SIGMA = 0.1
+PHOTO_EXPOSURE_RANGE = (0.5, 1.1)
+
+
+def clean_from_frame(rng: np.random.Generator, frame: Frame, profile: CameraProfile) -> Raw:
+    """Expose a rendered frame with a random auto-exposure; see `clean_from_linear`."""
+    return clean_from_linear(rng, expose(rng, frame.radiance), profile)
+
+
+def clean_from_linear(rng: np.random.Generator, linear_srgb: np.ndarray, profile: CameraProfile) -> Raw:
+    """Linear light (H, W, 3), 1 = saturation, seen through random colour of `profile`: float Raw in 0..1.
+
+    An odd last row or column is dropped.
+    """
+    matrix, gains = colour_rand(rng, profile.xyz_to_camera)
+    return _raw(linear_to_camera(_even(linear_srgb), matrix, gains), matrix, gains, profile)
+
+
+def clean_from_photo(rng: np.random.Generator, srgb: np.ndarray, profile: CameraProfile) -> Raw:
+    """Unprocess a photo (H, W, 3), sRGB-encoded 0..1, with random colour and exposure: float Raw in 0..1.
+
+    An odd last row or column is dropped.
+    """
+    check_srgb(srgb)
+    matrix, gains = colour_rand(rng, profile.xyz_to_camera)
+    exposure = float(np.clip(rng.normal(PHOTO_EXPOSURE_MEAN, PHOTO_EXPOSURE_SIGMA), *PHOTO_EXPOSURE_RANGE))
+    return _raw(unprocess(_even(srgb), matrix, gains, exposure), matrix, gains, profile)
+
+
+def noisy_from_clean(rng: np.random.Generator, clean: Raw, iso: float, level: NoiseLevel) -> Raw:
+    """One stored exposure of `clean` at `level`: noise, then the camera's own rounding and clipping."""
+    return replace(quantise(add_noise(rng, clean, level)), iso=iso)
+
+
+def _raw(
+    camera: np.ndarray, matrix: np.ndarray, gains: tuple[float, float, float], profile: CameraProfile
+) -> Raw:
+    return Raw(
+        mosaic=mosaic(camera, profile.cfa),
+        cfa=profile.cfa,
+        black_level=profile.black_level,
+        white_level=profile.white_level,
+        white_balance=gains,
+        xyz_to_camera=matrix,
+        camera=profile.camera,
+    )
+
+
+def _even(image: np.ndarray) -> np.ndarray:
+    height, width = image.shape[:2]
+    return image[: height - height % 2, : width - width % 2]

@@ -1,0 +1,59 @@
+"""The converter: DN = clip(round(black + x (white - black)), 0, white).
+
+The camera stores integers: noise below black survives only down to DN 0, and nothing exceeds the level
+at which the sensor saturates, `white_level`. Noisy images go through these integers exactly once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from fsid.errors import FsidError
+from fsid.sensor.raw import Raw
+
+MAX_DN = 65535
+
+
+def to_dn(raw: Raw) -> np.ndarray:
+    """Integers that `raw`'s camera would have stored: (H, W) uint16, 0..white_level."""
+    check_levels(raw.black_level, raw.white_level, raw.camera)
+    dn = raw.mosaic * np.float32(raw.white_level - raw.black_level)
+    dn += np.float32(raw.black_level)
+    np.rint(dn, out=dn)
+    np.clip(dn, 0, raw.white_level, out=dn)
+    return dn.astype(np.uint16)
+
+
+def from_dn(dn: np.ndarray, black_level: float, white_level: float) -> np.ndarray:
+    """Normalised float32 x of stored integers of any shape and type."""
+    x = dn.astype(np.float32)
+    x -= np.float32(black_level)
+    x *= np.float32(1 / (white_level - black_level))
+    return x
+
+
+def quantise(raw: Raw) -> Raw:
+    """`raw` as read back from the camera's file: rounded to DN, clipped to 0..white_level."""
+    return replace(raw, mosaic=from_dn(to_dn(raw), raw.black_level, raw.white_level))
+
+
+def clean_levels(raw: Raw) -> Raw:
+    """The same image with levels scaled by the largest power of two that 16 bits hold (64..1023: by 64).
+
+    A clean image stored with them is rounded to 1/64 of the camera's DN, which is far below its noise.
+    """
+    scale = 1
+    while 2 * scale * raw.white_level <= MAX_DN:
+        scale *= 2
+    return replace(raw, black_level=raw.black_level * scale, white_level=raw.white_level * scale)
+
+
+def check_levels(black_level: float, white_level: float, where: str) -> None:
+    """FsidError, naming `where`, unless 0 <= black < white <= 65535."""
+    if not 0 <= black_level < white_level <= MAX_DN:
+        raise FsidError(
+            f"{where}: black level {black_level:g} and white level {white_level:g} must satisfy "
+            f"0 <= black < white <= {MAX_DN}"
+        )
