@@ -1,0 +1,23 @@
+"""RAW denoising networks: train them on shards, load them, run them on files of any size."""
+
+from fsid.denoise.denoise import denoise_raw
+from fsid.denoise.files import MosaicLayout, denoise_file
+from fsid.denoise.model import Denoiser, ModelCard, load_model, save_model
+from fsid.denoise.raw_denoiser import NetworkConfig, RawDenoiser
+from fsid.denoise.train import load_history, train
+from fsid.denoise.train_config import TrainConfig
+
+__all__ = [
+    "Denoiser",
+    "ModelCard",
+    "MosaicLayout",
+    "NetworkConfig",
+    "RawDenoiser",
+    "TrainConfig",
+    "denoise_file",
+    "denoise_raw",
+    "load_history",
+    "load_model",
+    "save_model",
+    "train",
+]

@@ -1,0 +1,49 @@
+"""The one line that a training shows: step, loss, PSNR, patches per second, time left."""
+
+from __future__ import annotations
+
+from types import TracebackType
+
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from fsid.denoise.train_config import TrainConfig
+
+_SMOOTHING = 0.05  # of the shown loss and PSNR, which jump from batch to batch
+
+
+class LiveLine:
+    """Context manager; nothing is shown where `quiet`."""
+
+    def __init__(self, config: TrainConfig, step: int, *, quiet: bool) -> None:
+        columns = (
+            TextColumn("train"),
+            BarColumn(bar_width=20),
+            MofNCompleteColumn(),
+            TextColumn("loss {task.fields[loss]:.3f}  PSNR {task.fields[psnr]:.2f} dB"),
+            TextColumn("{task.fields[rate]}"),
+            TimeRemainingColumn(),
+        )
+        self._progress = Progress(*columns, disable=quiet)
+        self._task = self._progress.add_task(
+            "train", total=config.steps, completed=step, loss=0.0, psnr=0.0, rate=""
+        )
+        self._batch = config.batch
+        self._shown: tuple[float, float] | None = None
+
+    def __enter__(self) -> LiveLine:
+        self._progress.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._progress.stop()
+
+    def update(self, step: int, loss: float, psnr: float) -> None:
+        """Figures of the step just done."""
+        old_loss, old_psnr = self._shown or (loss, psnr)
+        loss, psnr = old_loss + _SMOOTHING * (loss - old_loss), old_psnr + _SMOOTHING * (psnr - old_psnr)
+        self._shown = loss, psnr
+        speed = self._progress.tasks[0].speed
+        rate = f"{speed * self._batch:.0f} patches/s" if speed else ""
+        self._progress.update(self._task, completed=step, loss=loss, psnr=psnr, rate=rate)

@@ -1,0 +1,186 @@
+"""Train a denoiser on a dataset of clean mosaics; noise is drawn afresh for every patch.
+
+    minimise  mean over patches of  log( mean (net(noisy) - clean)^2 + eps )        AdamW, warm-up + cosine,
+    EMA
+
+The loss is minus the PSNR of each patch (NAFNet's loss, Chen et al. 2022, section 4): a logarithm per patch
+gives dark and bright, quiet and noisy patches equal weight, which a plain mean over ISO 400..8000 would not.
+
+**Resume.** Batch `step` depends on (seed, step) and everything else that a step needs is in one checkpoint
+file: weights, their moving average, both moments of AdamW, the loss history. It is replaced atomically, so a
+run killed at any moment goes on from its last checkpoint, and on a CPU it ends with the same bits as an
+undisturbed one.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import torch
+from accelerate import Accelerator
+from torch import Tensor
+from torch.utils.data import DataLoader
+
+from fsid.config import load_settings, save_settings, to_plain
+from fsid.dataset.loader import Batch, PatchConfig, PatchDataset
+from fsid.denoise.checkpoint import TrainState, load_checkpoint, save_checkpoint
+from fsid.denoise.live import LiveLine
+from fsid.denoise.model import MODEL_FILE, ModelCard, save_model, write_atomically
+from fsid.denoise.raw_denoiser import RawDenoiser
+from fsid.denoise.train_config import TrainConfig
+from fsid.errors import FsidError
+
+CONFIG_FILE = "config.yaml"
+HISTORY_FILE = "history.json"
+_LOSS_FLOOR = 1e-8  # a patch restored better than 80 dB counts no further
+
+
+def train(
+    data_dir: Path,
+    run_dir: Path,
+    config: TrainConfig,
+    *,
+    resume: bool = False,
+    quiet: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+) -> Path:
+    """Train on `data_dir`'s shards; config, checkpoint, history, model go to `run_dir`. Path of the model.
+
+    A run that is in `run_dir` already goes on from its checkpoint; it must have been started with the same
+    config. resume: insist that there is one. progress(done, steps) is called instead of showing the live line.
+    Raises FsidError for unusable data or settings, another run in `run_dir`, or a training that diverges.
+    """
+    _prepare_run(run_dir, config, resume)
+    if config.threads:
+        torch.set_num_threads(config.threads)
+    accelerator = Accelerator(mixed_precision="bf16" if torch.cuda.is_available() else "no")
+    patches = PatchDataset(data_dir, _patch_config(config), config.seed, accelerator.process_index)
+    torch.manual_seed(config.seed)
+    net, optimizer = _prepare(accelerator, config)
+    bare = accelerator.unwrap_model(net)
+    state = load_checkpoint(run_dir, bare, optimizer)
+    loader = DataLoader(
+        patches, batch_size=None, sampler=range(state.step, config.steps), num_workers=config.loader_processes
+    )
+    is_main = accelerator.is_main_process
+    with LiveLine(config, state.step, quiet=quiet or progress is not None or not is_main) as live:
+        for batch in loader:
+            rate = learning_rate(config, state.step)
+            loss, psnr = _step(accelerator, net, optimizer, batch, rate, config)
+            state.advance(bare, config.ema_decay)
+            state.log(loss, psnr, rate, config.log_every)
+            live.update(state.step, loss, psnr)
+            if progress is not None:
+                progress(state.step, config.steps)
+            if is_main and state.step % config.checkpoint_every == 0:
+                _save(run_dir, state, bare, optimizer)
+    if is_main:
+        _save(run_dir, state, bare, optimizer)
+        card = _card(config, state, f"{patches.mosaics} images of {data_dir.resolve().name}")
+        save_model(run_dir / MODEL_FILE, state.average, card)
+    return run_dir / MODEL_FILE
+
+
+def load_history(run_dir: Path) -> tuple[list[int], list[float], list[float]]:
+    """Steps, losses and PSNRs (dB) of a run's training batches, means over `log_every` steps each."""
+    path = run_dir / HISTORY_FILE
+    try:
+        rows = json.loads(path.read_text(encoding="utf-8"))
+        return [row["step"] for row in rows], [row["loss"] for row in rows], [row["psnr"] for row in rows]
+    except OSError as error:
+        raise FsidError(f"{path}: cannot be read ({error.strerror}); give the folder of a training") from None
+    except (ValueError, KeyError, TypeError):
+        raise FsidError(
+            f"{path}: is not the history of a training; resume the run to write it again"
+        ) from None
+
+
+def learning_rate(config: TrainConfig, step: int) -> float:
+    """Linear warm-up over `warmup_steps`, then half a cosine down to `final_rate` x `learning_rate`."""
+    if step < config.warmup_steps:
+        return config.learning_rate * (step + 1) / config.warmup_steps
+    progress = (step - config.warmup_steps) / max(1, config.steps - config.warmup_steps)
+    cosine = 0.5 * (1 + np.cos(np.pi * min(progress, 1.0)))
+    return float(config.learning_rate * (config.final_rate + (1 - config.final_rate) * cosine))
+
+
+def psnr_loss(estimate: Tensor, clean: Tensor) -> tuple[Tensor, Tensor]:
+    """(loss, PSNR in dB with data range 1), both means over the patches of (B, 4, h, w)."""
+    error = (estimate - clean).square().mean((1, 2, 3))
+    return torch.log(error + _LOSS_FLOOR).mean(), -10 * torch.log10(error.detach() + _LOSS_FLOOR).mean()
+
+
+def _prepare_run(run_dir: Path, config: TrainConfig, resume: bool) -> None:
+    file = run_dir / CONFIG_FILE
+    if file.is_file():
+        old, new = (asdict(c) for c in (load_settings(TrainConfig, file), config))
+        if changed := [key for key in new if new[key] != old[key]]:
+            raise FsidError(
+                f"{file}: this run was started with another {', '.join(changed)}; "
+                "continue it with its own settings or give another folder"
+            )
+    elif resume:
+        raise FsidError(f"{run_dir}: holds no training to resume")
+    else:
+        try:
+            run_dir.mkdir(parents=True, exist_ok=True)
+            save_settings(config, file)
+        except OSError as error:
+            raise FsidError(f"{run_dir}: cannot be written ({error.strerror})") from None
+
+
+def _patch_config(config: TrainConfig) -> PatchConfig:
+    return PatchConfig(
+        size_px=config.patch_px,
+        batch=config.batch,
+        profiles=config.profiles,
+        iso_min=config.iso_min,
+        iso_max=config.iso_max,
+    )
+
+
+def _prepare(accelerator: Accelerator, config: TrainConfig) -> tuple[torch.nn.Module, torch.optim.Optimizer]:
+    net = RawDenoiser(config.network)
+    optimizer = torch.optim.AdamW(
+        net.parameters(), lr=config.learning_rate, betas=config.betas, weight_decay=config.weight_decay
+    )
+    return accelerator.prepare(net, optimizer)
+
+
+def _step(
+    accelerator: Accelerator,
+    net: torch.nn.Module,
+    optimizer: torch.optim.Optimizer,
+    batch: Batch,
+    rate: float,
+    config: TrainConfig,
+) -> tuple[float, float]:
+    noisy, clean, k, sigma2 = (
+        tensor.to(accelerator.device, non_blocking=True)
+        for tensor in (batch.noisy, batch.clean, batch.k, batch.sigma2)
+    )
+    for group in optimizer.param_groups:
+        group["lr"] = rate
+    optimizer.zero_grad()
+    loss, psnr = psnr_loss(net(noisy, k, sigma2), clean)
+    accelerator.backward(loss)
+    accelerator.clip_grad_norm_(net.parameters(), config.clip_norm)
+    optimizer.step()
+    value = loss.item()
+    if not np.isfinite(value):
+        raise FsidError("the loss is not finite: the training diverged; lower learning_rate and start again")
+    return value, psnr.item()
+
+
+def _save(run_dir: Path, state: TrainState, net: torch.nn.Module, optimizer: torch.optim.Optimizer) -> None:
+    save_checkpoint(run_dir, state, net, optimizer)
+    write_atomically(run_dir / HISTORY_FILE, json.dumps(state.history, indent=0).encode())
+
+
+def _card(config: TrainConfig, state: TrainState, training: str) -> ModelCard:
+    details = {"config": to_plain(config), "torch": torch.__version__, "last": state.history[-1:]}
+    return ModelCard(config.network, config.patch_px, training, details)

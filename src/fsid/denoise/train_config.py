@@ -1,0 +1,59 @@
+"""Settings of a training; the YAML files of `fsid/configs` are instances of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from fsid.denoise.raw_denoiser import NetworkConfig
+from fsid.errors import FsidError
+
+
+@dataclass(frozen=True)
+class TrainConfig:
+    """How to train.
+
+    network: size of the NAFNet. steps: of the optimizer. batch: patches per step and process. patch_px: side
+    of a patch in packed pixels (the mosaic patch has twice that). learning_rate: peak; final_rate: end of the
+    cosine as a share of it. warmup_steps: linear rise. betas, weight_decay: of AdamW. clip_norm: largest
+    gradient norm. ema_decay: of the moving average of the weights, which is the model that is kept. profiles:
+    cameras whose noise is drawn, by name or file. iso_min, iso_max: log-uniform range. seed: of weights,
+    patches and noise. log_every, checkpoint_every: steps. threads: of PyTorch on a CPU, 0 leaves its own
+    choice. loader_processes: extra processes that prepare batches (0: none, right on a CPU).
+    """
+
+    network: NetworkConfig = field(default_factory=NetworkConfig)
+    steps: int = 200_000
+    batch: int = 16
+    patch_px: int = 64
+    learning_rate: float = 1e-3
+    final_rate: float = 0.001
+    warmup_steps: int = 1000
+    betas: tuple[float, float] = (0.9, 0.9)
+    weight_decay: float = 0.0
+    clip_norm: float = 1.0
+    ema_decay: float = 0.999
+    profiles: tuple[str, ...] = ("pixel6", "galaxy-s22")
+    iso_min: float = 400.0
+    iso_max: float = 8000.0
+    seed: int = 0
+    log_every: int = 20
+    checkpoint_every: int = 500
+    threads: int = 0
+    loader_processes: int = 0
+
+    def __post_init__(self) -> None:
+        for key in ("steps", "batch", "patch_px", "log_every", "checkpoint_every"):
+            if getattr(self, key) < 1:
+                raise FsidError(f"{key}: must be at least 1, got {getattr(self, key)}")
+        for key in ("learning_rate", "clip_norm"):
+            if not getattr(self, key) > 0:
+                raise FsidError(f"{key}: must be above 0, got {getattr(self, key)}")
+        for key in ("warmup_steps", "weight_decay", "threads", "loader_processes", "seed"):
+            if getattr(self, key) < 0:
+                raise FsidError(f"{key}: must not be negative, got {getattr(self, key)}")
+        if not 0 <= self.ema_decay < 1:
+            raise FsidError(f"ema_decay: must be at least 0 and below 1, got {self.ema_decay}")
+        if not 0 < self.iso_min <= self.iso_max:
+            raise FsidError(
+                f"iso_min {self.iso_min} and iso_max {self.iso_max}: must satisfy 0 < iso_min <= iso_max"
+            )
