@@ -11,7 +11,7 @@ highest frequencies are set by the texel, because detail down to one texel is wh
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from PIL import Image, ImageDraw
@@ -38,8 +38,11 @@ def noise(
 ) -> np.ndarray:
     """(S, S) float32 Gaussian noise, mean 0, variance 1, amplitude ~ f^-slope between low and high.
 
-    low, high: cycles per tile, soft edges. stretch: how many times longer the features are along u and v.
+    low, high: cycles per tile, soft edges. stretch: how many times longer the features are along u and v;
+    such a field is cut off at the texel across the features and proportionally earlier along them.
     """
+    if stretch != (1.0, 1.0):
+        high = min(high, size / 2)
     white = rng.standard_normal((size, size), dtype=np.float32)
     fx = np.arange(size // 2 + 1, dtype=np.float32)[None] * np.float32(stretch[0])
     fy = (np.fft.fftfreq(size, 1 / size).astype(np.float32) * np.float32(stretch[1]))[:, None]
@@ -84,6 +87,8 @@ def cells(
     """
     seeds = (0.5 + jitter * (rng.random((count, count, 2)) - 0.5)).astype(np.float32)
     values = rng.random((count, count), dtype=np.float32)
+    ring = np.arange(-1, count + 1) % count
+    seeds_x, seeds_y = (seeds[ring][:, ring, k].ravel() for k in (0, 1))
     u, v = axes(size)
     x = np.broadcast_to(u * count, (size, size))
     y = np.broadcast_to(v * count, (size, size))
@@ -91,19 +96,18 @@ def cells(
         x, y = x + shift[0], y + shift[1]
     ix, iy = np.floor(x).astype(np.int32), np.floor(y).astype(np.int32)
     x, y = x - ix, y - iy
+    home = (iy % count + 1) * (count + 2) + ix % count + 1
     near = np.full((size, size), np.inf, np.float32)
-    second, value = near.copy(), np.zeros_like(near)
+    second, best = near.copy(), home.copy()
     for oy in (-1, 0, 1):
         for ox in (-1, 0, 1):
-            flat = (iy + oy) % count * count + (ix + ox) % count
-            dx = x - np.float32(ox) - seeds[..., 0].ravel()[flat]
-            dy = y - np.float32(oy) - seeds[..., 1].ravel()[flat]
+            cell = home + (oy * (count + 2) + ox)
+            dx, dy = x - seeds_x[cell] - ox, y - seeds_y[cell] - oy
             distance = dx * dx + dy * dy
-            closer = distance < near
-            second = np.where(closer, near, np.minimum(second, distance))
-            value[closer] = values.ravel()[flat[closer]]
-            near = np.where(closer, distance, near)
-    return np.sqrt(near), np.sqrt(second), value
+            np.copyto(best, cell, where=distance < near)
+            np.minimum(second, np.maximum(near, distance), out=second)
+            np.minimum(near, distance, out=near)
+    return np.sqrt(near), np.sqrt(second), values[ring][:, ring].ravel()[best]
 
 
 def ink(size: int, marks: list[Draw], sharpness: int = 2) -> np.ndarray:
@@ -133,7 +137,7 @@ def scratches(
     """(S, S) float32 in [0, 1]: `count` hair lines about one texel wide, `length` of a tile long on average."""
     wide = size * 2
     start = rng.random((count, 2)) * wide
-    angle = np.radians(angle_deg + spread_deg * (rng.random(count) - 0.5))
+    angle = np.radians(spread_deg * (rng.random(count) - 0.5))
     reach = length * rng.exponential(1.0, count).clip(0.05, 3) * wide
     ends = start + np.c_[np.cos(angle), np.sin(angle)] * reach[:, None]
     shade = rng.integers(70, 256, count)
@@ -153,3 +157,26 @@ def scratches(
         return line
 
     return ink(size, [mark(k) for k in range(count)])
+
+
+def stack(size: int, outlines: Sequence[np.ndarray]) -> np.ndarray:
+    """(2S, 2S) int32: which polygon lies on top, 0 for none, k + 1 for outlines[k], later ones above.
+
+    outlines: (n, 2) corners in tile units; they wrap around. Turn it into a map with `shade`.
+    """
+    wide = size * 2
+    canvas = Image.new("I", (wide, wide), 0)
+    draw = ImageDraw.Draw(canvas)
+    for k, outline in enumerate(outlines):
+        low, high = np.floor(outline.min(0)).astype(int), np.floor(outline.max(0)).astype(int)
+        for i in range(-high[0], 1 - low[0]):
+            for j in range(-high[1], 1 - low[1]):
+                draw.polygon(((outline + np.array((i, j))) * wide).ravel().tolist(), fill=k + 1)
+    return np.asarray(canvas)
+
+
+def shade(index: np.ndarray, values: np.ndarray, ground: float = 0.0) -> np.ndarray:
+    """(S, S) float32: a value per polygon of `stack`, edges anti-aliased by averaging 2 x 2."""
+    table = np.r_[ground, values].astype(np.float32)
+    fine = table[index]
+    return (fine[::2, ::2] + fine[1::2, ::2] + fine[::2, 1::2] + fine[1::2, 1::2]) / 4

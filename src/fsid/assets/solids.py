@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 
@@ -43,7 +44,7 @@ class Solid:
 
     def at(self, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Solid:
         """Moved by (x, y, z) metres."""
-        return Solid(self.vertices + (x, y, z), self.normals, self.faces)
+        return Solid(self.vertices + np.array((x, y, z)), self.normals, self.faces)
 
     def turned(self, x_deg: float = 0.0, y_deg: float = 0.0, z_deg: float = 0.0) -> Solid:
         """Rotated about the origin by Rz Ry Rx."""
@@ -90,7 +91,7 @@ def box(size_x: float, size_y: float, size_z: float, bevel: float = 0.004, steps
     half = np.array((size_x, size_y, size_z)) / 2
     radius = min(bevel, 0.98 * half.min())
     vertices = signs * (half - radius) + directions * radius
-    return Solid(vertices + (0, 0, half[2]), directions, faces)
+    return Solid(vertices + np.array((0, 0, half[2])), directions, faces)
 
 
 def lathe(profile: Sequence[Sequence[float]], segments: int = 32, crease_deg: float = 35.0) -> Solid:
@@ -101,8 +102,7 @@ def lathe(profile: Sequence[Sequence[float]], segments: int = 32, crease_deg: fl
     heading /= _length(heading)
     bend = np.degrees(np.arccos(np.clip((heading[1:] * heading[:-1]).sum(1), -1, 1)))
     cuts = [0, *(np.flatnonzero(bend > crease_deg) + 1), len(points) - 1]
-    runs = zip(cuts[:-1], cuts[1:], strict=True)
-    return join([_revolved(points[a : b + 1], heading[a:b], segments) for a, b in runs])
+    return join([_revolved(points[a : b + 1], heading[a:b], segments) for a, b in pairwise(cuts)])
 
 
 def cylinder(radius: float, height: float, bevel: float = 0.003, segments: int = 32) -> Solid:
@@ -135,7 +135,7 @@ def sweep(path: np.ndarray, radius: float | np.ndarray, segments: int = 12, *, c
 
 
 def sheet(points: np.ndarray, thickness: float) -> Solid:
-    """Thick sheet over a grid `points` (n, m, 3): top, bottom and rim. Top is on the side of d_cols x d_rows."""
+    """Thick sheet over a grid `points` (n, m, 3): two sides and a rim; the top faces d_cols x d_rows."""
     rows, cols = points.shape[:2]
     faces = _grid_faces(rows, cols)
     middle = points.reshape(-1, 3)
@@ -222,10 +222,7 @@ def _with_caps(path: np.ndarray, radii: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 
 def _tangents(path: np.ndarray, closed: bool) -> np.ndarray:
-    if closed:
-        step = np.roll(path, -1, axis=0) - np.roll(path, 1, axis=0)
-    else:
-        step = np.gradient(path, axis=0)
+    step = np.roll(path, -1, axis=0) - np.roll(path, 1, axis=0) if closed else np.gradient(path, axis=0)
     return step / _length(step)
 
 

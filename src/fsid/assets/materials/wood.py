@@ -10,8 +10,8 @@ from fsid.assets.registry import Layers, material_family
 
 def _fibres(rng: np.random.Generator, size: int) -> tuple[np.ndarray, np.ndarray]:
     """Grain along u: slow colour bands and pores one texel wide."""
-    bands = noise(rng, size, 1.3, low=3, stretch=(14, 1))
-    pores = noise(rng, size, 0.2, low=size / 8, stretch=(40, 1))
+    bands = noise(rng, size, 1.0, low=3, stretch=(14, 1))
+    pores = noise(rng, size, 0.3, low=size / 12, stretch=(30, 1))
     return bands, pores
 
 
@@ -42,15 +42,15 @@ def wood_planks(rng: np.random.Generator, variant: int, size: int) -> Layers:
 @material_family("wood_grain", tile_m=0.5, relief_m=0.0008)
 def wood_grain(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """One cut of wood: growth rings warped by noise; straight for variant 0, burl for 3."""
-    u, v = axes(size)
-    twist = (0.01, 0.03, 0.08, 0.16)[variant]
-    bend = noise(rng, size, 2.0, high=24, stretch=(4 - variant, 1))
-    ring = (v * (9, 12, 8, 5)[variant] + bend * twist * 12) % 1.0
-    late = ring**3
-    _, pores = _fibres(rng, size)
+    _, v = axes(size)
+    twist = (0.4, 0.7, 1.2, 1.9)[variant]
+    bend = noise(rng, size, 1.8, high=60, stretch=(4 - variant, 1))
+    ring = (v * (16, 22, 14, 8)[variant] + bend * twist) % 1.0
+    late = (ring * edge(1 - ring, 0.04, 0.08)) ** 3
+    bands, pores = _fibres(rng, size)
     eyes = edge(noise(rng, size, 2.2), 1.9, 0.5) * (variant > 1)
     return Layers(
-        mix=np.clip(0.75 * late + 0.25 * level(bend), 0, 1),
+        mix=np.clip(0.65 * late + 0.35 * level(bands), 0, 1),
         pattern=np.clip(0.8 * eyes + 0.25 * level(pores - 1.4, 0.4), 0, 1),
         detail=0.5 + 0.055 * pores - 0.06 * (late - 0.3),
         roughness=0.35 + 0.1 * level(pores),
