@@ -18,7 +18,7 @@ from PIL import Image, UnidentifiedImageError
 from fsid.errors import FsidError
 from fsid.sensor.colour import published_matrices
 from fsid.sensor.mosaic import check_cfa, unpack
-from fsid.sensor.quantise import check_levels, from_dn
+from fsid.sensor.quantise import MAX_DN, check_levels, from_dn
 from fsid.sensor.raw import Raw
 
 
@@ -49,8 +49,8 @@ def read_mosaic(
     dn = _read(path, cfa, width, height)
     if dn.ndim != 2 or min(dn.shape) < 2:
         raise FsidError(f"{path}: holds an array of shape {dn.shape}, not a mosaic (height, width)")
-    if dn.dtype.kind not in "ui" or dn.max() > 65535:
-        raise FsidError(f"{path}: holds {dn.dtype} values; a mosaic holds DN as integers up to 65535")
+    if dn.dtype.kind not in "ui" or dn.min() < 0 or dn.max() > MAX_DN:
+        raise FsidError(f"{path}: holds {dn.dtype} values; a mosaic holds DN as integers from 0 to {MAX_DN}")
     if (height or dn.shape[0], width or dn.shape[1]) != dn.shape:
         raise FsidError(f"{path}: is {dn.shape[1]}x{dn.shape[0]}, not {width}x{height}; correct the size")
     return Raw(
@@ -79,7 +79,7 @@ def _read(path: Path, cfa: str, width: int | None, height: int | None) -> np.nda
                 return np.asarray(image)
         if kind in (".tif", ".tiff"):
             return tifffile.imread(path)
-    except (OSError, ValueError, UnidentifiedImageError, tifffile.TiffFileError) as error:
+    except (OSError, EOFError, ValueError, UnidentifiedImageError, tifffile.TiffFileError) as error:
         raise FsidError(f"{path}: cannot read this {kind} file: {error}") from error
     raise FsidError(f"{path}: unknown kind of mosaic file; use .raw, .bin, .npy, .png or .tif")
 

@@ -10,11 +10,10 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 import numpy as np
 import rawpy
-import tifffile
 
 from fsid.errors import FsidError
 from fsid.sensor import dng_tags
@@ -22,10 +21,24 @@ from fsid.sensor.colour import published_matrices
 from fsid.sensor.mosaic import CFA_PATTERNS, site_offsets
 from fsid.sensor.quantise import from_dn, to_dn
 from fsid.sensor.raw import Raw
-from fsid.sensor.tiff import Directory, image_tags, tiff_bytes
+from fsid.sensor.tiff import (
+    CFA,
+    EXIF_IFD,
+    PHOTOMETRIC,
+    RGB,
+    STRIP_OFFSETS,
+    STRIP_SIZES,
+    SUB_IFD,
+    TILE_OFFSETS,
+    TILE_SIZES,
+    Directory,
+    Values,
+    image_tags,
+    read_directories,
+    tiff_bytes,
+)
 
 _FULL_IMAGE, _REDUCED_IMAGE = 0, 1  # TIFF NewSubfileType
-_RGB, _CFA = 2, 32803  # TIFF PhotometricInterpretation
 
 
 def write_dng(target: str | Path | BinaryIO, raw: Raw, preview: np.ndarray | None = None) -> None:
@@ -50,11 +63,13 @@ def write_dng(target: str | Path | BinaryIO, raw: Raw, preview: np.ndarray | Non
 
 def dng_pixel_offset(dng: str | Path | BinaryIO) -> int:
     """Byte offset of the mosaic, (H, W) little-endian uint16, in a DNG written by `write_dng`."""
-    try:
-        with tifffile.TiffFile(dng) as tiff:
-            return int(_mosaic_page(tiff).dataoffsets[0])
-    except (tifffile.TiffFileError, IndexError) as error:
-        raise FsidError(f"{getattr(dng, 'name', dng)}: not a DNG file") from error
+    if isinstance(dng, str | Path):
+        with Path(dng).open("rb") as file:
+            return dng_pixel_offset(file)
+    offsets = _mosaic_directory(read_directories(dng)).get(STRIP_OFFSETS)
+    if not offsets:
+        raise FsidError(f"{getattr(dng, 'name', 'DNG')}: not a DNG file that FSID wrote")
+    return int(offsets[0])
 
 
 def read_raw(path: str | Path) -> Raw:
@@ -78,42 +93,40 @@ def read_raw(path: str | Path) -> Raw:
 
 def _dng_bytes(raw: Raw, preview: np.ndarray | None) -> bytes:
     dn = to_dn(raw)
-    mosaic_tags = image_tags(dn, _CFA, _FULL_IMAGE) + dng_tags.mosaic_tags(raw)
+    mosaic_tags = image_tags(dn, CFA, _FULL_IMAGE) + dng_tags.mosaic_tags(raw)
     exif_tags = dng_tags.exif_tags(raw)
-    exif = ((dng_tags.EXIF_IFD, Directory(exif_tags)),) if exif_tags else ()
+    exif = ((EXIF_IFD, Directory(exif_tags)),) if exif_tags else ()
     if preview is None:
         return tiff_bytes(Directory(mosaic_tags + dng_tags.camera_tags(raw), dn, exif))
     if preview.ndim != 3 or preview.shape[2] != 3 or preview.dtype != np.uint8:
         raise FsidError(f"a DNG preview must be (h, w, 3) uint8; got {preview.shape} {preview.dtype}")
-    mosaic = (dng_tags.SUB_IFD, Directory(mosaic_tags, dn))
-    first = image_tags(preview, _RGB, _REDUCED_IMAGE) + dng_tags.camera_tags(raw)
+    mosaic = (SUB_IFD, Directory(mosaic_tags, dn))
+    first = image_tags(preview, RGB, _REDUCED_IMAGE) + dng_tags.camera_tags(raw)
     return tiff_bytes(Directory(first, preview, (mosaic, *exif)))
 
 
-def _mosaic_page(tiff: tifffile.TiffFile) -> tifffile.TiffPage:
-    """The directory with the CFA image: the first one of a file, or a sub-directory of it."""
-    first = tiff.pages.first
-    for page in (first, *(first.pages or ())):
-        if page.photometric == tifffile.PHOTOMETRIC.CFA:
-            return page
-    return first
+def _mosaic_directory(directories: list[dict[int, Values]]) -> dict[int, Values]:
+    """The directory that describes the CFA image, {} where none does."""
+    return next((d for d in directories if d.get(PHOTOMETRIC) == (CFA,)), {})
 
 
-def _read_tags(path: Path) -> dict[int, Any]:
-    """Tags of the first and the mosaic directory of a TIFF-based RAW, {} for other formats."""
-    try:
-        with tifffile.TiffFile(path) as tiff:
-            page = _mosaic_page(tiff)
-            tags = {t.code: t.value for p in (tiff.pages.first, page) for t in p.tags}
-            ends = [o + n for o, n in zip(page.dataoffsets, page.databytecounts, strict=False)]
-    except (tifffile.TiffFileError, IndexError, ValueError, KeyError, TypeError, AttributeError):
-        return {}
-    if max(ends, default=0) > path.stat().st_size:
-        raise FsidError(f"{path}: truncated, its pixels end after {path.stat().st_size} bytes; copy it again")
+def _read_tags(path: Path) -> dict[int, Values]:
+    """Tags of a TIFF-based RAW, those of the mosaic's own directory foremost; {} for other formats."""
+    with path.open("rb") as file:
+        directories = read_directories(file)
+    mosaic = _mosaic_directory(directories)
+    size = path.stat().st_size
+    for offsets, sizes in ((STRIP_OFFSETS, STRIP_SIZES), (TILE_OFFSETS, TILE_SIZES)):
+        ends = (o + n for o, n in zip(mosaic.get(offsets, ()), mosaic.get(sizes, ()), strict=False))
+        if max(ends, default=0) > size:
+            raise FsidError(f"{path}: truncated, its pixels go on after byte {size}; copy it again")
+    tags: dict[int, Values] = {}
+    for directory in (*directories, mosaic):
+        tags |= directory
     return tags
 
 
-def _from_libraw(file: rawpy.RawPy, tags: dict[int, Any], path: Path) -> Raw:
+def _from_libraw(file: rawpy.RawPy, tags: dict[int, Values], path: Path) -> Raw:
     cfa = _cfa(file, path)
     tile = file.raw_colors_visible[:2, :2]
     dn = file.raw_image_visible
@@ -132,7 +145,7 @@ def _from_libraw(file: rawpy.RawPy, tags: dict[int, Any], path: Path) -> Raw:
         white_level=white,
         white_balance=_white_balance(file),
         xyz_to_camera=_xyz_to_camera(file, tags),
-        camera=_camera(tags),
+        camera=dng_tags.camera_name(tags),
         iso=dng_tags.iso_speed(tags),
         noise=dng_tags.noise_level(tags),
     )
@@ -157,14 +170,8 @@ def _white_balance(file: rawpy.RawPy) -> tuple[float, float, float]:
     return 1.0, 1.0, 1.0
 
 
-def _xyz_to_camera(file: rawpy.RawPy, tags: dict[int, Any]) -> np.ndarray:
+def _xyz_to_camera(file: rawpy.RawPy, tags: dict[int, Values]) -> np.ndarray:
     matrix = dng_tags.d65_matrix(tags)
     if matrix is None:
         matrix = np.asarray(file.rgb_xyz_matrix[:3], np.float64)
     return matrix if np.any(matrix) else published_matrices().mean(axis=0)
-
-
-def _camera(tags: dict[int, Any]) -> str:
-    if dng_tags.UNIQUE_CAMERA_MODEL in tags:
-        return str(tags[dng_tags.UNIQUE_CAMERA_MODEL])
-    return " ".join(str(tags[c]) for c in (dng_tags.MAKE, dng_tags.MODEL) if c in tags) or "unknown"

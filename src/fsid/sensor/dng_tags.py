@@ -17,11 +17,13 @@ from typing import Any
 import numpy as np
 
 from fsid.sensor.raw import NoiseLevel, Raw
-from fsid.sensor.tiff import ASCII, BYTE, DOUBLE, LONG, RATIONAL, SHORT, SRATIONAL, Tag
+from fsid.sensor.tiff import ASCII, BYTE, DOUBLE, LONG, RATIONAL, SHORT, SRATIONAL, Tag, Values
 
-MAKE, MODEL, ORIENTATION, SUB_IFD = 271, 272, 274, 330
+Tags = dict[int, Values]
+
+MAKE, MODEL, ORIENTATION = 271, 272, 274
 CFA_REPEAT, CFA_PATTERN = 33421, 33422
-EXIF_IFD, EXIF_ISO = 34665, 34855
+EXIF_ISO = 34855
 DNG_VERSION, DNG_BACKWARD_VERSION, UNIQUE_CAMERA_MODEL = 50706, 50707, 50708
 CFA_PLANE_COLOUR, CFA_LAYOUT, BLACK_LEVEL, WHITE_LEVEL = 50710, 50711, 50714, 50717
 COLOUR_MATRIX_1, COLOUR_MATRIX_2, AS_SHOT_NEUTRAL, PRIVATE_DATA = 50721, 50722, 50728, 50740
@@ -78,51 +80,75 @@ def noise_profile(level: NoiseLevel) -> tuple[float, ...]:
     return (*pairs[0], *green, *pairs[3])
 
 
-def noise_level(tags: dict[int, Any]) -> NoiseLevel | None:
+def noise_level(tags: Tags) -> NoiseLevel | None:
     """The noise that `tags` state, exact where FSID wrote them; None where they state none."""
-    private = _private_values(tags)
-    if "k" in private:
-        return NoiseLevel(k=tuple(private["k"]), sigma2=tuple(private["sigma2"]))
-    values = tags.get(NOISE_PROFILE, ())
+    private = _private_numbers(tags)
+    if len(private) == 9:
+        return NoiseLevel(k=private[1:5], sigma2=private[5:9])
+    values = _numbers(tags, NOISE_PROFILE)
     if len(values) == 2:
-        values = tuple(values) * 3
+        values *= 3
     if len(values) != 6 or not np.all(np.isfinite(values)):
         return None
-    red, green, blue = (tuple(map(float, values[i : i + 2])) for i in (0, 2, 4))
+    red, green, blue = values[0:2], values[2:4], values[4:6]
     return NoiseLevel(k=(red[0], green[0], green[0], blue[0]), sigma2=(red[1], green[1], green[1], blue[1]))
 
 
-def iso_speed(tags: dict[int, Any]) -> float:
+def iso_speed(tags: Tags) -> float:
     """The ISO that `tags` state, exact where FSID wrote it; 0 where they state none."""
-    private = _private_values(tags)
-    if "iso" in private:
-        return float(private["iso"])
-    if EXIF_ISO in tags:
-        return float(np.max(tags[EXIF_ISO]))
-    exif = tags.get(EXIF_IFD)
-    return float(np.max(exif.get("ISOSpeedRatings", 0))) if isinstance(exif, dict) else 0.0
+    private = _private_numbers(tags)
+    return private[0] if private else _number(tags, EXIF_ISO, 0)
 
 
-def d65_matrix(tags: dict[int, Any]) -> np.ndarray | None:
+def d65_matrix(tags: Tags) -> np.ndarray | None:
     """(3, 3) XYZ -> camera matrix for D65, else for the other illuminant that `tags` offer, else None."""
-    first = (tags.get(ILLUMINANT_1, D65), tags.get(COLOUR_MATRIX_1))
-    second = (tags.get(ILLUMINANT_2), tags.get(COLOUR_MATRIX_2))
+    first = (_number(tags, ILLUMINANT_1, D65), _numbers(tags, COLOUR_MATRIX_1))
+    second = (_number(tags, ILLUMINANT_2, 0), _numbers(tags, COLOUR_MATRIX_2))
     for _, numbers in sorted((first, second), key=lambda pair: pair[0] != D65):
-        if numbers is not None and len(numbers) == 18:
+        if len(numbers) == 18 and all(numbers[1::2]):
             return np.array([n / d for n, d in zip(numbers[::2], numbers[1::2], strict=True)]).reshape(3, 3)
     return None
+
+
+def camera_name(tags: Tags) -> str:
+    """UniqueCameraModel, else make and model, else "unknown"."""
+    return (
+        _text(tags, UNIQUE_CAMERA_MODEL) or f"{_text(tags, MAKE)} {_text(tags, MODEL)}".strip() or "unknown"
+    )
 
 
 def _private_data(raw: Raw) -> bytes:
     values: dict[str, Any] = {"iso": raw.iso}
     if raw.noise is not None:
-        values |= {"k": list(raw.noise.k), "sigma2": list(raw.noise.sigma2)}
+        values |= {"k": raw.noise.k, "sigma2": raw.noise.sigma2}
     return _OWNER + json.dumps(values).encode("ascii")
 
 
-def _private_values(tags: dict[int, Any]) -> dict[str, Any]:
-    data = bytes(tags.get(PRIVATE_DATA, b""))
-    return json.loads(data[len(_OWNER) :]) if data.startswith(_OWNER) else {}
+def _private_numbers(tags: Tags) -> Any:
+    """(iso,) or (iso, four k, four sigma2) of FSID's private data, () where it is not there or broken."""
+    data = tags.get(PRIVATE_DATA)
+    if not isinstance(data, bytes) or not data.startswith(_OWNER):
+        return ()
+    try:
+        values = json.loads(data[len(_OWNER) :])
+        numbers = tuple(float(v) for v in (values["iso"], *values.get("k", ()), *values.get("sigma2", ())))
+    except (ValueError, TypeError, KeyError, AttributeError):
+        return ()
+    return numbers if np.all(np.isfinite(numbers)) else ()
+
+
+def _numbers(tags: Tags, code: int) -> tuple[float, ...]:
+    values = tags.get(code, ())
+    return () if isinstance(values, bytes) else values
+
+
+def _number(tags: Tags, code: int, default: float) -> float:
+    return next(iter(_numbers(tags, code)), default)
+
+
+def _text(tags: Tags, code: int) -> str:
+    values = tags.get(code, b"")
+    return values.split(b"\0")[0].decode("ascii", "replace").strip() if isinstance(values, bytes) else ""
 
 
 def _rationals(values: Any) -> tuple[int, ...]:

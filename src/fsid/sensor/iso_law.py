@@ -19,7 +19,10 @@ Both results are monotone and continuous in ISO, and never below the floor.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
+from numpy.polynomial.polynomial import polyval
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import nnls
 
@@ -27,9 +30,45 @@ RELATIVE_ERROR = 0.1  # of a published value against the law, where no absolute 
 _REWEIGHTINGS = 10
 
 
+@dataclass(frozen=True)
+class IsoCurve:
+    """Values of the four sites R, Gr, Gb, B at any ISO.
+
+    first, last: ends of the table. inside: log(ISO) -> log(values) between them, None where the law alone
+    holds. law: (powers, 4) polynomial coefficients in ascending order.
+    """
+
+    first: float
+    last: float
+    inside: PchipInterpolator | None
+    law: np.ndarray
+
+    def __call__(self, iso: float) -> np.ndarray:
+        """(4,) values at `iso` > 0."""
+        if self.inside is None:
+            return polyval(iso, self.law)
+        nearest = min(max(iso, self.first), self.last)
+        return np.exp(self.inside(np.log(nearest))) * polyval(iso, self.law) / polyval(nearest, self.law)
+
+
+def k_curve(iso: np.ndarray, k: np.ndarray) -> IsoCurve:
+    """k over ISO from a table: iso (n,) ascending, k (n, 4) > 0."""
+    law = np.stack([k_law(iso, site) for site in k.T], axis=1)
+    return IsoCurve(iso[0], iso[-1], _inside(iso, k), law)
+
+
+def sigma2_curve(iso: np.ndarray, sigma2: np.ndarray, floor: float) -> IsoCurve:
+    """sigma2 >= floor over ISO from a table: iso (n,) ascending, sigma2 (n, 4), impossible values allowed."""
+    impossible = sigma2[sigma2 < floor]
+    error = float(np.sqrt(np.mean((impossible - floor) ** 2))) if impossible.size else 0.0
+    law = np.stack([sigma2_law(iso, site, floor, error) for site in sigma2.T], axis=1)
+    law[0] += floor
+    return IsoCurve(iso[0], iso[-1], None if impossible.size else _inside(iso, sigma2), law)
+
+
 def k_law(iso: np.ndarray, k: np.ndarray) -> np.ndarray:
     """Coefficients (a, b) >= 0 of `k = a + b ISO`, least relative squares; iso, k (n,)."""
-    return _nonnegative_fit(iso, k, degree=1, error=0.0)
+    return _nonnegative_fit(iso, k, powers=(1, 0), error=0.0)
 
 
 def sigma2_law(iso: np.ndarray, sigma2: np.ndarray, floor: float, error: float) -> np.ndarray:
@@ -37,33 +76,11 @@ def sigma2_law(iso: np.ndarray, sigma2: np.ndarray, floor: float, error: float) 
 
     error: absolute error of one value; 0 where it is relative only.
     """
-    return _nonnegative_fit(iso, sigma2 - floor, degree=2, error=max(error, floor))
+    return _nonnegative_fit(iso, sigma2 - floor, powers=(2, 0, 1), error=max(error, floor))
 
 
-def k_at(iso: float, table_iso: np.ndarray, k: np.ndarray) -> np.ndarray:
-    """k of the four sites at `iso`; table_iso (n,) ascending, k (n, 4) > 0. Returns (4,)."""
-    return np.array([_at(iso, table_iso, site, k_law(table_iso, site)) for site in _rising(k).T])
-
-
-def sigma2_at(iso: float, table_iso: np.ndarray, sigma2: np.ndarray, floor: float) -> np.ndarray:
-    """sigma2 of the four sites at `iso`, >= floor; table_iso (n,) ascending, sigma2 (n, 4). Returns (4,)."""
-    impossible = sigma2[sigma2 < floor]
-    error = float(np.sqrt(np.mean((impossible - floor) ** 2))) if impossible.size else 0.0
-    laws = [sigma2_law(table_iso, site, floor, error) for site in sigma2.T]
-    if impossible.size:
-        return np.array([floor + np.polynomial.polynomial.polyval(iso, law) for law in laws])
-    total = [law + np.array([floor, 0.0, 0.0]) for law in laws]
-    return np.array([_at(iso, table_iso, s, law) for s, law in zip(_rising(sigma2).T, total, strict=True)])
-
-
-def _at(iso: float, table_iso: np.ndarray, values: np.ndarray, law: np.ndarray) -> float:
-    first, last = table_iso[0], table_iso[-1]
-    if first < iso < last:
-        curve = PchipInterpolator(np.log(table_iso), np.log(values))
-        return float(np.exp(curve(np.log(iso))))
-    end, value = (first, values[0]) if iso <= first else (last, values[-1])
-    polyval = np.polynomial.polynomial.polyval
-    return float(value * polyval(iso, law) / polyval(end, law))
+def _inside(iso: np.ndarray, values: np.ndarray) -> PchipInterpolator | None:
+    return PchipInterpolator(np.log(iso), np.log(_rising(values))) if len(iso) > 1 else None
 
 
 def _rising(values: np.ndarray) -> np.ndarray:
@@ -73,17 +90,23 @@ def _rising(values: np.ndarray) -> np.ndarray:
     return (above + below) / 2
 
 
-def _nonnegative_fit(iso: np.ndarray, values: np.ndarray, degree: int, error: float) -> np.ndarray:
-    """Polynomial in ISO with coefficients >= 0, weights 1 / hypot(error, RELATIVE_ERROR * model).
+def _nonnegative_fit(
+    iso: np.ndarray, values: np.ndarray, powers: tuple[int, ...], error: float
+) -> np.ndarray:
+    """Polynomial in ISO with coefficients >= 0 in ascending order; weights 1 / hypot(error, 0.1 model).
 
-    Weights follow the model, not the data: a value that is too small by chance would else count too much.
+    powers: of ISO, the indispensable first; a table of n ISOs gets the first n of them. Weights follow the
+    model, not the data: a value that is too small by chance would else count too much.
     """
     scale = float(iso[-1])
-    powers = (iso / scale)[:, None] ** np.arange(degree + 1)
+    used = list(powers[: len(iso)])
+    columns = (iso / scale)[:, None] ** np.array(used)
     model = np.full(len(iso), max(float(np.max(np.abs(values))), error))
-    coefficients = np.zeros(degree + 1)
+    fitted = np.zeros(len(used))
     for _ in range(_REWEIGHTINGS):
         weight = 1.0 / np.hypot(error, RELATIVE_ERROR * model)
-        coefficients, _ = nnls(powers * weight[:, None], values * weight)
-        model = powers @ coefficients
-    return coefficients / scale ** np.arange(degree + 1)
+        fitted, _ = nnls(columns * weight[:, None], values * weight)
+        model = columns @ fitted
+    coefficients = np.zeros(len(powers))
+    coefficients[used] = fitted / scale ** np.array(used)
+    return coefficients

@@ -11,6 +11,7 @@ stand there as measured; `iso_law` turns them into a physical level at any ISO. 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from importlib.resources import files
 from itertools import pairwise
 from pathlib import Path
@@ -21,7 +22,7 @@ import yaml
 
 from fsid.errors import FsidError
 from fsid.sensor.colour import published_matrices
-from fsid.sensor.iso_law import k_at, sigma2_at
+from fsid.sensor.iso_law import IsoCurve, k_curve, sigma2_curve
 from fsid.sensor.mosaic import check_cfa
 from fsid.sensor.raw import NoiseLevel
 
@@ -64,10 +65,13 @@ class CameraProfile:
         """Noise at any ISO > 0, monotone and continuous in ISO; see `iso_law` for what is believed where."""
         if not (np.isfinite(iso) and iso > 0):
             raise FsidError(f"profile {self.name}: ISO {iso} is not a positive number")
-        table_iso = np.asarray(self.iso)
-        k = k_at(iso, table_iso, self.k)
-        sigma2 = sigma2_at(iso, table_iso, self.sigma2, ROUNDING_VARIANCE_DN2 / self.span**2)
-        return NoiseLevel(k=_four(k), sigma2=_four(sigma2))
+        k, sigma2 = self._curves
+        return NoiseLevel(k=_four(k(iso)), sigma2=_four(sigma2(iso)))
+
+    @cached_property
+    def _curves(self) -> tuple[IsoCurve, IsoCurve]:
+        iso, floor = np.array(self.iso), ROUNDING_VARIANCE_DN2 / self.span**2
+        return k_curve(iso, self.k), sigma2_curve(iso, self.sigma2, floor)
 
 
 def profile_names() -> tuple[str, ...]:

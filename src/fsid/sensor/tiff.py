@@ -1,10 +1,10 @@
-"""TIFF 6.0 as bytes: a header, directories of tags, pixels.
+"""TIFF 6.0 directories: the container of DNG and of most cameras' RAW files.
 
     "II" 42 offset | directory: count, (code, type, count, value or offset)..., next | ... | pixels
 
-FSID reads TIFF with tifffile and writes it here, for two reasons: a DNG needs an EXIF directory, or LibRaw
-does not see its ISO, and tifffile writes none; and the same image must give the same bytes on every machine,
-whatever version of a library is installed there.
+Written here and not with tifffile, because a DNG needs an EXIF directory, or LibRaw does not see its ISO, and
+because the same image must give the same bytes whatever version of a library is installed. Read here,
+because a broken file must cost neither time nor memory: a tag that reaches outside the file is not there.
 """
 
 from __future__ import annotations
@@ -12,18 +12,37 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import BinaryIO
 
 import numpy as np
 
 BYTE, ASCII, SHORT, LONG, RATIONAL, SRATIONAL, DOUBLE = 1, 2, 3, 4, 5, 10, 12
+SUB_IFD, EXIF_IFD = 330, 34665
+PHOTOMETRIC, STRIP_OFFSETS, STRIP_SIZES, TILE_OFFSETS, TILE_SIZES = 262, 273, 279, 324, 325
+RGB, CFA = 2, 32803  # photometric interpretations
 
-_FORMAT = {BYTE: "B", SHORT: "H", LONG: "I", RATIONAL: "I", SRATIONAL: "i", DOUBLE: "d"}
+Values = tuple[float, ...] | bytes  # numbers (numerator, denominator, ... of rationals), or bytes and text
+
+_BYTES = (BYTE, ASCII, 7)
+_FORMAT = {
+    SHORT: "H",
+    LONG: "I",
+    RATIONAL: "II",
+    8: "h",
+    9: "i",
+    SRATIONAL: "ii",
+    11: "f",
+    DOUBLE: "d",
+    13: "I",
+}
 _HEADER_SIZE = 8
+_MAX_TAG_BYTES = 1 << 20  # a tag of a healthy file that FSID reads is far smaller
+_MAX_CHILDREN = 16
 
 
 @dataclass(frozen=True)
 class Tag:
-    """One entry. values: numbers (numerator, denominator, ... for rationals), or bytes for BYTE and ASCII."""
+    """One entry of a directory."""
 
     code: int
     kind: int
@@ -48,7 +67,7 @@ def image_tags(pixels: np.ndarray, photometric: int, subfile_type: int) -> tuple
         Tag(257, LONG, (pixels.shape[0],)),
         Tag(258, SHORT, (8 * pixels.itemsize,) * samples),
         Tag(259, SHORT, (1,)),  # no compression
-        Tag(262, SHORT, (photometric,)),
+        Tag(PHOTOMETRIC, SHORT, (photometric,)),
         Tag(277, SHORT, (samples,)),
         Tag(278, LONG, (pixels.shape[0],)),
         Tag(284, SHORT, (1,)),  # samples of a pixel side by side
@@ -82,7 +101,10 @@ def _walk(directory: Directory) -> Iterator[Directory]:
 def _encode(directory: Directory, offset: int, pixel_offset: int, at: dict[int, int]) -> bytes:
     tags = [*directory.tags, *(Tag(code, LONG, (at.get(id(d), 0),)) for code, d in directory.children)]
     if directory.pixels is not None:
-        tags += [Tag(273, LONG, (pixel_offset,)), Tag(279, LONG, (directory.pixels.nbytes,))]
+        tags += [
+            Tag(STRIP_OFFSETS, LONG, (pixel_offset,)),
+            Tag(STRIP_SIZES, LONG, (directory.pixels.nbytes,)),
+        ]
     tail_offset = offset + 2 + 12 * len(tags) + 4
     entries, tail = b"", b""
     for tag in sorted(tags, key=lambda t: t.code):
@@ -99,5 +121,45 @@ def _encode(directory: Directory, offset: int, pixel_offset: int, at: dict[int, 
 def _values(tag: Tag) -> tuple[bytes, int]:
     if isinstance(tag.values, bytes):
         return tag.values, len(tag.values)
-    count = len(tag.values) // (2 if tag.kind in (RATIONAL, SRATIONAL) else 1)
-    return struct.pack(f"<{len(tag.values)}{_FORMAT[tag.kind]}", *tag.values), count
+    letters = _FORMAT[tag.kind]
+    count = len(tag.values) // len(letters)
+    return struct.pack("<" + letters * count, *tag.values), count
+
+
+def read_directories(file: BinaryIO) -> list[dict[int, Values]]:
+    """The first directory of a TIFF, its EXIF directory and its sub-directories, as far as they are whole.
+
+    [] where `file` is no TIFF. Codes map to values; broken entries are left out.
+    """
+    header = file.read(_HEADER_SIZE)
+    order = {b"II*\0": "<", b"MM\0*": ">"}.get(header[:4])
+    if order is None or len(header) < _HEADER_SIZE:
+        return []
+    size = file.seek(0, 2)
+    first = _read_directory(file, order, struct.unpack(order + "I", header[4:])[0], size)
+    children = (*first.get(EXIF_IFD, ()), *first.get(SUB_IFD, ()))[:_MAX_CHILDREN]
+    return [first, *(_read_directory(file, order, int(offset), size) for offset in children)]
+
+
+def _read_directory(file: BinaryIO, order: str, offset: int, size: int) -> dict[int, Values]:
+    if offset + 2 > size:
+        return {}
+    file.seek(offset)
+    (count,) = struct.unpack(order + "H", file.read(2))
+    entries = file.read(12 * count)
+    tags: dict[int, Values] = {}
+    for start in range(0, len(entries) - 11, 12):
+        code, kind, values = struct.unpack_from(order + "HHI", entries, start)
+        letters = "B" if kind in _BYTES else _FORMAT.get(kind, "")
+        length = values * struct.calcsize(order + letters)
+        if not 0 < length <= _MAX_TAG_BYTES:
+            continue
+        data = entries[start + 8 : start + 8 + length]
+        if length > 4:
+            (place,) = struct.unpack_from(order + "I", entries, start + 8)
+            if place + length > size:
+                continue
+            file.seek(place)
+            data = file.read(length)
+        tags[code] = data if kind in _BYTES else struct.unpack(order + letters * values, data)
+    return tags

@@ -1,0 +1,98 @@
+"""Mosaics without metadata: every container gives the same Raw, and a wrong size is named."""
+
+import numpy as np
+import pytest
+import tifffile
+from PIL import Image
+
+from fsid.errors import FsidError
+from fsid.sensor import CFA_PATTERNS, develop, pack, read_mosaic
+
+DN = np.random.default_rng(0).integers(0, 4096, (6, 8)).astype(np.uint16)
+CAMERA = {"cfa": "GRBG", "black_level": 256, "white_level": 4095}
+
+
+def _write(path, kind):
+    if kind in ("raw", "bin"):
+        path.write_bytes(DN.astype("<u2").tobytes())
+    elif kind == "png":
+        Image.fromarray(DN).save(path)
+    elif kind == "tif":
+        tifffile.imwrite(path, DN)
+    else:
+        np.save(path, DN if kind == "npy" else np.moveaxis(pack(DN, CAMERA["cfa"]), 0, 2))
+
+
+@pytest.mark.parametrize("kind", ["raw", "bin", "png", "tif", "npy", "packed.npy"])
+def test_every_container_gives_the_same_raw(tmp_path, kind):
+    path = tmp_path / f"mosaic.{kind}"
+    _write(path, kind)
+    raw = read_mosaic(path, width=8, height=6, iso=800, white_balance=(2.0, 1.0, 1.5), **CAMERA)
+    np.testing.assert_allclose(raw.mosaic, (DN.astype(np.float64) - 256) / 3839, atol=1e-6)
+    assert raw.mosaic.dtype == np.float32
+    assert raw.mosaic.min() < 0
+    assert (raw.cfa, raw.black_level, raw.white_level, raw.iso) == ("GRBG", 256, 4095, 800)
+
+
+def test_an_odd_last_row_and_column_are_dropped(tmp_path):
+    np.save(tmp_path / "odd.npy", DN[:5, :7])
+    assert read_mosaic(tmp_path / "odd.npy", **CAMERA).mosaic.shape == (4, 6)
+
+
+def _npy(array):
+    def write(path):
+        np.save(path, array)
+
+    return write
+
+
+@pytest.mark.parametrize(
+    ("name", "write", "size", "words"),
+    [
+        ("a.raw", lambda p: p.write_bytes(bytes(95)), {"width": 8, "height": 6}, "95"),
+        ("a.raw", lambda p: p.write_bytes(bytes(96)), {}, "width and height"),
+        ("a.npy", _npy(DN), {"width": 6, "height": 8}, "8x6, not 6x8"),
+        ("a.npy", _npy(DN / 4095.0), {}, "float64"),
+        ("a.npy", _npy(DN.astype(np.int64) * 20), {}, "65535"),
+        ("a.npy", _npy(DN.astype(np.int32) - 4096), {}, "65535"),
+        ("a.npy", _npy(np.zeros((4, 4, 3), np.uint16)), {}, r"\(4, 4, 3\)"),
+        ("a.npy", _npy(np.array([{"a": 1}])), {}, r"a\.npy"),
+        ("a.npy", lambda p: p.write_bytes(b"text"), {}, r"a\.npy"),
+        ("a.png", lambda p: p.write_bytes(b"text"), {}, r"a\.png"),
+        ("a.png", lambda p: Image.new("RGB", (4, 4)).save(p), {}, r"\(4, 4, 3\)"),
+        ("a.tif", lambda p: p.write_bytes(b"text"), {}, r"a\.tif"),
+        ("a.txt", lambda p: p.write_bytes(b"text"), {}, "unknown kind"),
+        ("a.raw", lambda p: None, {"width": 8, "height": 6}, "no such"),
+    ],
+)
+def test_a_file_that_does_not_fit_is_named(tmp_path, name, write, size, words):
+    write(tmp_path / name)
+    with pytest.raises(FsidError, match=words) as caught:
+        read_mosaic(tmp_path / name, **CAMERA, **size)
+    assert name in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [({"cfa": "RGB"}, "cfa"), ({"black_level": 5000}, "black"), ({"white_level": 70000}, "65535")],
+)
+def test_a_camera_that_cannot_be_is_refused(tmp_path, change, words):
+    np.save(tmp_path / "a.npy", DN)
+    with pytest.raises(FsidError, match=words):
+        read_mosaic(tmp_path / "a.npy", **(CAMERA | change))
+
+
+def test_real_samples_open_and_their_pattern_is_right(shared_data):
+    """Neighbouring greens of a real image are alike, red and blue are not: only RGGB-like order fits."""
+    path = shared_data / "raw" / "nikon_DSC_1339_768x512_rggb.raw"
+    if not path.is_file():
+        pytest.skip(f"{path}: no real sample here")
+    levels = {"black_level": 600, "white_level": 16383, "width": 768, "height": 512}
+    saturation = {}
+    for cfa in CFA_PATTERNS:
+        raw = read_mosaic(path, cfa=cfa, **levels)
+        _, gr, gb, _ = pack(raw.mosaic, cfa)
+        saturation[cfa] = np.mean(np.abs(gr - gb))
+        assert np.all(np.isfinite(develop(raw)))
+    assert max(saturation["RGGB"], saturation["BGGR"]) < 0.2 * min(saturation["GRBG"], saturation["GBRG"])

@@ -1,0 +1,258 @@
+"""DNG: what is written opens in LibRaw with the same pixels and comes back as the same Raw."""
+
+import io
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import rawpy
+import tifffile
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from fsid.errors import FsidError
+from fsid.sensor import (
+    CFA_PATTERNS,
+    NoiseLevel,
+    Raw,
+    clean_levels,
+    dng_pixel_offset,
+    load_profile,
+    quantise,
+    read_raw,
+    to_dn,
+    write_dng,
+)
+from fsid.sensor.colour import published_matrices
+from fsid.sensor.dng_tags import noise_profile
+from fsid.sensor.tiff import ASCII, BYTE, SHORT, Directory, Tag, image_tags, tiff_bytes
+
+HEIGHT, WIDTH = 34, 50
+PREVIEW = np.random.default_rng(0).integers(0, 256, (17, 25, 3)).astype(np.uint8)
+
+
+def _raw(cfa: str = "GBRG", seed: int = 0) -> Raw:
+    rng = np.random.default_rng(seed)
+    profile = load_profile("pixel6")
+    return Raw(
+        mosaic=rng.normal(0.2, 0.3, (HEIGHT, WIDTH)).astype(np.float32),
+        cfa=cfa,
+        black_level=64,
+        white_level=1023,
+        white_balance=(2.0 + rng.uniform(-0.1, 0.1), 1.0, 1.7),
+        xyz_to_camera=published_matrices()[seed % 4],
+        camera=profile.camera,
+        iso=2371.375,
+        noise=profile.level(2371.375),
+    )
+
+
+@pytest.mark.parametrize("cfa", CFA_PATTERNS)
+@pytest.mark.parametrize("preview", [None, PREVIEW], ids=["bare", "preview"])
+def test_round_trip(tmp_path, cfa, preview):
+    raw = _raw(cfa)
+    assert raw.mosaic.min() < -0.05
+    assert raw.mosaic.max() > 1.0
+    path = tmp_path / "a.dng"
+    write_dng(path, raw, preview)
+    back = read_raw(path)
+    np.testing.assert_array_equal(back.mosaic, quantise(raw).mosaic)
+    assert back.mosaic.min() < -0.05
+    assert back.mosaic.dtype == np.float32
+    assert (back.cfa, back.black_level, back.white_level) == (cfa, 64, 1023)
+    assert (back.camera, back.iso, back.noise) == (raw.camera, raw.iso, raw.noise)
+    np.testing.assert_allclose(back.white_balance, raw.white_balance, rtol=1e-6)
+    np.testing.assert_allclose(back.xyz_to_camera, raw.xyz_to_camera, rtol=1e-9)
+    assert [p.name for p in tmp_path.iterdir()] == ["a.dng"]
+
+
+@pytest.mark.parametrize("cfa", CFA_PATTERNS)
+@pytest.mark.parametrize("preview", [None, PREVIEW], ids=["bare", "preview"])
+def test_libraw_sees_the_same_picture(tmp_path, cfa, preview):
+    raw = _raw(cfa)
+    path = tmp_path / "a.dng"
+    write_dng(path, raw, preview)
+    with rawpy.imread(str(path)) as file:
+        np.testing.assert_array_equal(file.raw_image_visible, to_dn(raw))
+        pattern = "".join(file.color_desc.decode()[i] for i in file.raw_pattern.ravel())
+        assert pattern == cfa
+        assert file.black_level_per_channel == [64] * 4
+        assert file.white_level == 1023
+        np.testing.assert_allclose(file.camera_whitebalance[:3], raw.white_balance, rtol=1e-6)
+        assert file.other.iso_speed == 2371
+        assert file.postprocess(use_camera_wb=True, half_size=True).shape == (HEIGHT // 2, WIDTH // 2, 3)
+        if preview is not None:
+            np.testing.assert_array_equal(file.extract_thumb().data, preview)
+
+
+def test_tifffile_reads_the_tags(tmp_path):
+    raw = _raw()
+    write_dng(tmp_path / "a.dng", raw, PREVIEW)
+    with tifffile.TiffFile(tmp_path / "a.dng") as tiff:
+        first = tiff.pages.first
+        np.testing.assert_array_equal(first.asarray(), PREVIEW)
+        np.testing.assert_array_equal(first.pages[0].asarray(), to_dn(raw))
+        assert first.tags["UniqueCameraModel"].value == raw.camera
+        assert first.tags["Make"].value == "Google"
+        assert first.tags["CalibrationIlluminant1"].value == 21
+        assert first.tags["Orientation"].value == 1
+        assert first.tags["ExifTag"].value["ISOSpeedRatings"] == 2371
+        level = first.pages[0].tags["NoiseProfile"].value
+    red, green, blue = (0,), (1, 2), (3,)
+    for plane, sites in enumerate((red, green, blue)):
+        assert level[2 * plane] == np.mean([raw.noise.k[s] for s in sites])
+        assert level[2 * plane + 1] == np.mean([raw.noise.sigma2[s] for s in sites])
+
+
+def test_noise_profile_of_other_writers_is_exact(tmp_path):
+    """Without FSID's private data the tag alone gives the level: bit for bit, greens alike."""
+    level = NoiseLevel(k=(1e-3, 2e-3 / 3, 2e-3 / 3, 3e-3), sigma2=(1e-7, 0.0, 0.0, np.pi * 1e-6))
+    buffer = io.BytesIO()
+    write_dng(buffer, replace(_raw(), noise=level))
+    data = buffer.getvalue().replace(b"FSID\0", b"ABCD\0")
+    (tmp_path / "a.dng").write_bytes(data)
+    back = read_raw(tmp_path / "a.dng")
+    assert back.noise == level
+    assert noise_profile(back.noise) == noise_profile(level)
+    assert back.iso == 2371
+
+
+def test_unknown_stays_unknown(tmp_path):
+    write_dng(tmp_path / "a.dng", replace(_raw(), noise=None, iso=0.0, camera=""))
+    back = read_raw(tmp_path / "a.dng")
+    assert (back.noise, back.iso, back.camera) == (None, 0.0, "unknown")
+
+
+def test_a_clean_image_is_rounded_far_below_its_noise(tmp_path):
+    raw = replace(_raw(), mosaic=np.random.default_rng(1).random((HEIGHT, WIDTH), np.float32))
+    write_dng(tmp_path / "a.dng", clean_levels(raw))
+    back = read_raw(tmp_path / "a.dng")
+    assert (back.black_level, back.white_level) == (4096, 65472)
+    weakest = min(load_profile("pixel6").level(800).sigma2) ** 0.5
+    assert np.max(np.abs(back.mosaic - raw.mosaic)) < 0.01 * weakest
+
+
+def test_the_same_image_gives_the_same_bytes_and_a_loader_can_map_them(tmp_path):
+    raw = _raw()
+    for preview in (None, PREVIEW):
+        one, two = io.BytesIO(), io.BytesIO()
+        write_dng(one, raw, preview)
+        write_dng(two, raw, preview)
+        assert one.getvalue() == two.getvalue()
+        path = tmp_path / "a.dng"
+        path.write_bytes(one.getvalue())
+        offset = dng_pixel_offset(path)
+        assert offset == dng_pixel_offset(io.BytesIO(one.getvalue()))
+        assert offset % 2 == 0
+        mapped = np.memmap(path, "<u2", "r", offset, (HEIGHT, WIDTH))
+        np.testing.assert_array_equal(mapped, to_dn(raw))
+
+
+def test_black_levels_of_each_site_are_subtracted_each(tmp_path):
+    """A camera whose four sites have blacks 60, 61, 62, 63 in the tile, and 1 DN of light everywhere."""
+    blacks = np.array([[60, 61], [62, 63]], np.uint16)
+    tags = [
+        (50706, "B", 4, bytes((1, 4, 0, 0)), True),
+        (50708, "s", 0, "Some camera", True),
+        (33421, "H", 2, (2, 2), True),
+        (33422, "B", 4, bytes((1, 2, 0, 1)), True),
+        (50713, "H", 2, (2, 2), True),
+        (50714, "I", 4, tuple(int(b) for b in blacks.ravel()), True),
+        (50717, "I", 1, 1023, True),
+    ]
+    dn = np.tile(blacks, (16, 20)) + np.uint16(1)
+    tifffile.imwrite(tmp_path / "a.dng", dn, photometric="cfa", extratags=tags, metadata=None)
+    back = read_raw(tmp_path / "a.dng")
+    assert back.cfa == "GBRG"
+    np.testing.assert_allclose(back.mosaic, 1 / (1023 - back.black_level), rtol=1e-4)
+
+
+def _write_other(path, kind):
+    linear_raw, cfa = 34892, 32803
+    shape, photometric = {
+        "linear": ((32, 32, 3), linear_raw),
+        "monochrome": ((32, 32), linear_raw),
+        "x-trans": ((36, 36), cfa),
+    }[kind]
+    pixels = np.zeros(shape, np.uint16)
+    pattern = bytes("RGB".index(c) for c in "GBGGRGRGRBGBGBGGRGGRGGBGBGBRGRGRGGBG")
+    tags = (
+        *image_tags(pixels, photometric, 0),
+        Tag(50706, BYTE, bytes((1, 4, 0, 0))),
+        Tag(50708, ASCII, b"Some camera\0"),
+        Tag(33421, SHORT, (6, 6)),
+        Tag(33422, BYTE, pattern),
+    )
+    path.write_bytes(tiff_bytes(Directory(tags[: None if kind == "x-trans" else -2], pixels)))
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [("linear", "no Bayer mosaic"), ("monochrome", "no Bayer mosaic"), ("x-trans", "X-Trans")],
+)
+def test_a_raw_that_is_not_bayer_is_named(tmp_path, kind, words):
+    _write_other(tmp_path / "other.dng", kind)
+    with pytest.raises(FsidError, match=words) as caught:
+        read_raw(tmp_path / "other.dng")
+    assert "other.dng" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("data", [b"", b"II*\0", b"hello, this is text\n" * 100, bytes(5000)])
+def test_what_is_not_raw_is_named(tmp_path, data):
+    (tmp_path / "note.dng").write_bytes(data)
+    with pytest.raises(FsidError, match=r"note\.dng"):
+        read_raw(tmp_path / "note.dng")
+
+
+def test_a_missing_file_and_a_folder_are_named(tmp_path):
+    for path in (tmp_path / "missing.dng", tmp_path):
+        with pytest.raises(FsidError, match=str(path)):
+            read_raw(path)
+
+
+def test_a_truncated_file_is_named(tmp_path):
+    buffer = io.BytesIO()
+    write_dng(buffer, _raw())
+    data = buffer.getvalue()
+    for kept in (len(data) - 1, len(data) // 2, 900, 500, 100, 9):
+        (tmp_path / "short.dng").write_bytes(data[:kept])
+        with pytest.raises(FsidError, match=r"short\.dng"):
+            read_raw(tmp_path / "short.dng")
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.lists(st.tuples(st.integers(0, 819), st.integers(0, 255)), min_size=1, max_size=4))
+def test_mutated_headers_end_with_an_image_or_one_line(tmp_path, changes):
+    buffer = io.BytesIO()
+    write_dng(buffer, _raw())
+    data = bytearray(buffer.getvalue())
+    for place, value in changes:
+        data[place] = value
+    (tmp_path / "fuzz.dng").write_bytes(data)
+    try:
+        raw = read_raw(tmp_path / "fuzz.dng")
+    except FsidError as error:
+        lines = str(error).splitlines()
+    else:
+        lines = ["fuzz.dng"]
+        assert np.all(np.isfinite(raw.mosaic))
+    assert len(lines) == 1
+    assert "fuzz.dng" in lines[0]
+
+
+def test_a_folder_that_is_not_there_leaves_nothing_behind(tmp_path):
+    with pytest.raises(FsidError, match="nowhere"):
+        write_dng(tmp_path / "nowhere" / "a.dng", _raw())
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_preview_of_the_wrong_type_is_refused():
+    with pytest.raises(FsidError, match="preview"):
+        write_dng(io.BytesIO(), _raw(), np.zeros((4, 4, 3), np.float32))
+
+
+def test_pixel_offset_of_no_dng_is_an_error(tmp_path):
+    (tmp_path / "note.dng").write_bytes(b"text")
+    with pytest.raises(FsidError, match=r"note\.dng"):
+        dng_pixel_offset(tmp_path / "note.dng")

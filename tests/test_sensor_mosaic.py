@@ -1,0 +1,90 @@
+"""Mosaic arithmetic: every pixel keeps its colour, whatever the pattern, crop or flip."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fsid.errors import FsidError
+from fsid.sensor import CFA_PATTERNS, Raw, bayer_crop, bayer_flip, mosaic, pack, unpack
+from fsid.sensor.mosaic import shift_cfa, site_offsets
+
+cfas = st.sampled_from(CFA_PATTERNS)
+sides = st.integers(1, 9).map(lambda n: 2 * n)
+
+
+def _colours(height: int, width: int) -> np.ndarray:
+    """An image whose value says which channel it is: 0, 1, 2."""
+    return np.broadcast_to(np.arange(3, dtype=np.float32), (height, width, 3))
+
+
+def _raw(image: np.ndarray, cfa: str) -> Raw:
+    return Raw(image, cfa, 64, 1023, (2.0, 1.0, 1.5), np.eye(3))
+
+
+@given(cfas, sides, sides)
+def test_mosaic_has_the_colour_that_the_pattern_names(cfa, height, width):
+    tile = ["RGB".index(colour) for colour in cfa]
+    expected = np.tile(np.reshape(tile, (2, 2)), (height // 2, width // 2))
+    np.testing.assert_array_equal(mosaic(_colours(height, width), cfa), expected)
+
+
+@given(cfas, sides, sides, st.integers(0, 2**32 - 1))
+def test_pack_and_unpack_are_inverse(cfa, height, width, seed):
+    image = np.random.default_rng(seed).normal(size=(height, width)).astype(np.float32)
+    packed = pack(image, cfa)
+    assert packed.shape == (4, height // 2, width // 2)
+    np.testing.assert_array_equal(unpack(packed, cfa), image)
+
+
+@given(cfas)
+def test_packed_order_is_red_green_green_blue_and_gr_shares_the_red_row(cfa):
+    np.testing.assert_array_equal(pack(mosaic(_colours(2, 2), cfa), cfa)[:, 0, 0], [0, 1, 1, 2])
+    red, gr, gb, blue = site_offsets(cfa)
+    assert gr[0] == red[0]
+    assert gb[0] == blue[0]
+    assert len({red, gr, gb, blue}) == 4
+
+
+@given(cfas, st.integers(0, 5), st.integers(0, 5))
+def test_crop_at_any_offset_keeps_every_pixels_colour(cfa, top, left):
+    whole = _raw(mosaic(_colours(12, 12), cfa), cfa)
+    cut = bayer_crop(whole, top, left, 6, 4)
+    np.testing.assert_array_equal(cut.mosaic, mosaic(_colours(6, 4), cut.cfa))
+    assert cut.cfa == shift_cfa(cfa, top, left)
+    assert (cut.cfa == cfa) == (top % 2 == 0 and left % 2 == 0)
+
+
+@given(cfas, st.booleans(), st.booleans())
+def test_flip_keeps_every_pixels_colour_and_twice_is_nothing(cfa, vertical, horizontal):
+    image = mosaic(_colours(6, 8) + np.arange(8)[:, None] * 10, cfa)
+    flipped = bayer_flip(_raw(image, cfa), vertical, horizontal)
+    np.testing.assert_array_equal(flipped.mosaic % 10, mosaic(_colours(6, 8), flipped.cfa))
+    again = bayer_flip(flipped, vertical, horizontal)
+    assert again.cfa == cfa
+    np.testing.assert_array_equal(again.mosaic, image)
+
+
+@settings(max_examples=20)
+@given(cfas, st.booleans(), st.booleans())
+def test_flip_keeps_gr_apart_from_gb(cfa, vertical, horizontal):
+    sites = np.broadcast_to(np.arange(4, dtype=np.float32)[:, None, None], (4, 3, 4))
+    flipped = bayer_flip(_raw(unpack(sites, cfa), cfa), vertical, horizontal)
+    np.testing.assert_array_equal(pack(flipped.mosaic, flipped.cfa), sites)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: pack(np.zeros((3, 4)), "RGGB"), "even height"),
+        (lambda: mosaic(np.zeros((4, 5, 3)), "RGGB"), "even height"),
+        (lambda: pack(np.zeros((4, 4)), "RGBG"), "RGBG"),
+        (lambda: unpack(np.zeros((3, 2, 2)), "RGGB"), r"\(3, 2, 2\)"),
+        (lambda: bayer_crop(_raw(np.zeros((4, 4)), "RGGB"), 2, 0, 4, 4), "outside"),
+        (lambda: bayer_crop(_raw(np.zeros((4, 4)), "RGGB"), -2, 0, 2, 2), "outside"),
+        (lambda: bayer_crop(_raw(np.zeros((4, 4)), "RGGB"), 0, 0, 3, 2), "even height"),
+    ],
+)
+def test_bad_shapes_and_patterns_are_named(call, words):
+    with pytest.raises(FsidError, match=words):
+        call()

@@ -1,0 +1,86 @@
+"""Pairs: clean is noise-free and inside the sensor's range, noisy is what the camera would have stored."""
+
+import numpy as np
+import pytest
+
+from fsid.errors import FsidError
+from fsid.render.frame import Frame
+from fsid.sensor import (
+    clean_from_frame,
+    clean_from_linear,
+    clean_from_photo,
+    develop,
+    load_profile,
+    noisy_from_clean,
+    pack,
+    profile_names,
+    to_dn,
+)
+
+
+def _frame(radiance: np.ndarray) -> Frame:
+    flat = np.zeros(radiance.shape[:2], np.float32)
+    normal = np.broadcast_to(np.array([0, 0, 1], np.float32), radiance.shape)
+    return Frame(radiance, np.ones_like(radiance), normal, flat + 1, flat.astype(np.int32))
+
+
+def _light(height: int = 33, width: int = 49) -> np.ndarray:
+    y, x = np.mgrid[0:height, 0:width].astype(np.float32)
+    return 7 * np.exp(np.stack([np.sin(x / 5), np.cos(y / 4), np.sin((x + y) / 6)], axis=-1))
+
+
+CLEAN = {
+    "frame": lambda rng, profile: clean_from_frame(rng, _frame(_light()), profile),
+    "photo": lambda rng, profile: clean_from_photo(rng, _light() / 21, profile),
+    "linear": lambda rng, profile: clean_from_linear(rng, _light() / 21, profile),
+}
+
+
+@pytest.mark.parametrize("source", CLEAN)
+@pytest.mark.parametrize("name", profile_names())
+def test_clean_is_the_cameras_and_in_range(source, name):
+    profile = load_profile(name)
+    clean = CLEAN[source](np.random.default_rng(4), profile)
+    assert clean.mosaic.shape == (32, 48)
+    assert clean.mosaic.dtype == np.float32
+    assert clean.mosaic.min() >= 0
+    assert clean.mosaic.max() <= 1
+    assert clean.mosaic.std() > 0.02
+    assert (clean.cfa, clean.black_level, clean.white_level) == (profile.cfa, 64, 1023)
+    assert (clean.camera, clean.noise, clean.iso) == (profile.camera, None, 0.0)
+
+
+@pytest.mark.parametrize("source", CLEAN)
+def test_a_pair_depends_on_its_generator_alone(source):
+    profile = load_profile("pixel6")
+    one, same, other = (CLEAN[source](np.random.default_rng(s), profile) for s in (1, 1, 2))
+    np.testing.assert_array_equal(one.mosaic, same.mosaic)
+    assert one.white_balance == same.white_balance
+    assert one.white_balance != other.white_balance
+
+
+def test_noisy_is_stored_in_the_cameras_integers_around_the_clean_signal():
+    profile = load_profile("galaxy-s22")
+    clean = clean_from_linear(np.random.default_rng(0), np.full((256, 256, 3), 0.3, np.float32), profile)
+    level = profile.level(3200)
+    noisy = noisy_from_clean(np.random.default_rng(1), clean, 3200, level)
+    np.testing.assert_allclose(noisy.mosaic * profile.span + 64, to_dn(noisy), atol=1e-3)
+    difference = pack(noisy.mosaic - clean.mosaic, profile.cfa).reshape(4, -1).astype(np.float64)
+    x = pack(clean.mosaic, profile.cfa)[:, 0, 0]
+    expected = np.array(level.k) * x + np.array(level.sigma2)
+    n = difference.shape[1]
+    assert np.all(np.abs(difference.mean(axis=1)) < 4.5 * np.sqrt(expected / n))
+    np.testing.assert_allclose(difference.var(axis=1), expected, rtol=4.5 * np.sqrt(2 / n))
+
+
+def test_a_developed_photo_keeps_its_neutral_colours():
+    profile = load_profile("pixel6")
+    grey = np.full((16, 16, 3), 0.5, np.float32)
+    for seed in range(5):
+        picture = develop(clean_from_photo(np.random.default_rng(seed), grey, profile))
+        assert np.max(np.ptp(picture, axis=2)) < 1e-4
+
+
+def test_a_photo_of_bytes_is_refused():
+    with pytest.raises(FsidError, match="255"):
+        clean_from_photo(np.random.default_rng(0), np.full((4, 4, 3), 128, np.uint8), load_profile("pixel6"))

@@ -1,0 +1,198 @@
+"""Profiles: published numbers are kept, their levels are physical, and a wrong file is named."""
+
+import json
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fsid.errors import FsidError
+from fsid.sensor import load_profile, profile_names
+from fsid.sensor.iso_law import k_law, sigma2_law
+
+PUBLISHED = {"pixel6": "pixel6/main", "galaxy-s22": "galaxy_s22plus/wide"}
+
+GOOD = """
+name: mine
+camera: My camera
+cfa: RGGB
+bits: 12
+black_level: 256
+white_level: 4095
+levels:
+  - iso: 100
+    k: [1.0e-04, 1.1e-04, 1.2e-04, 1.3e-04]
+    sigma2: [1.0e-06, 1.0e-06, 1.0e-06, 1.0e-06]
+  - iso: 400
+    k: [4.0e-04, 4.4e-04, 4.8e-04, 5.2e-04]
+    sigma2: [4.0e-06, 4.0e-06, 4.0e-06, 4.0e-06]
+"""
+
+
+def _array(level):
+    return np.array([level.k, level.sigma2])
+
+
+def test_the_two_phones_are_built_in():
+    assert set(PUBLISHED) <= set(profile_names())
+    for name in profile_names():
+        profile = load_profile(name)
+        assert profile.name == name
+        assert profile.source
+        assert (profile.black_level, profile.white_level, profile.bits) == (64, 1023, 10)
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_sites_are_the_published_ones_in_named_order(name, shared_data):
+    path = shared_data / "noise" / "published_models.json"
+    camera = json.loads(path.read_text())["cameras"][PUBLISHED[name]]
+    assert camera["cfa"] == "GBRG"
+    order = [2, 3, 0, 1]  # R, Gr, Gb, B in the tile G B / R G, counted row by row
+    profile = load_profile(name)
+    assert profile.iso == tuple(float(iso) for iso in camera["iso"])
+    for published, k, sigma2 in zip(camera["iso"].values(), profile.k, profile.sigma2, strict=True):
+        np.testing.assert_allclose(k, np.array(published["k"])[order], rtol=1e-9)
+        np.testing.assert_allclose(sigma2, np.array(published["sigma2"])[order], rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", profile_names())
+def test_levels_rise_with_iso_and_have_no_steps(name):
+    profile = load_profile(name)
+    iso = np.geomspace(25, 25600, 400)
+    levels = np.array([_array(profile.level(i)) for i in iso])
+    steps = np.diff(np.log(levels), axis=0) / np.diff(np.log(iso))[:, None, None]
+    assert np.all(steps >= -1e-9)
+    # Slopes in log-log: gain goes as ISO, amplified read noise as ISO squared; tables wiggle around that.
+    assert np.all(steps[:, 0] < 1.5)
+    assert np.all(steps[:, 1] < 3.5)
+
+
+@pytest.mark.parametrize("name", profile_names())
+def test_read_noise_is_never_below_rounding(name):
+    profile = load_profile(name)
+    floor = 1 / 12 / profile.span**2
+    for iso in (1, 50, 100, 800, 3200, 12800):
+        assert np.all(np.array(profile.level(iso).sigma2) >= floor * (1 - 1e-12))
+
+
+@pytest.mark.parametrize("name", profile_names())
+def test_published_gain_is_kept_at_published_iso(name):
+    profile = load_profile(name)
+    for iso, k in zip(profile.iso, profile.k, strict=True):
+        np.testing.assert_allclose(profile.level(iso).k, k, rtol=1e-9)
+
+
+def test_published_read_noise_is_kept_where_it_is_possible():
+    profile = load_profile("galaxy-s22")
+    for iso, sigma2 in list(zip(profile.iso, profile.sigma2, strict=True))[3:]:
+        np.testing.assert_allclose(profile.level(iso).sigma2, sigma2, rtol=1e-9)
+
+
+def test_impossible_read_noise_becomes_the_quadratic_of_its_trustworthy_end():
+    profile = load_profile("pixel6")
+    assert profile.sigma2.min() < 0  # as published
+    np.testing.assert_allclose(profile.level(3199).sigma2, profile.sigma2[-1], rtol=0.1)
+    floor = 1 / 12 / profile.span**2
+    low, high = (np.array(profile.level(iso).sigma2) - floor for iso in (1600, 6400))
+    np.testing.assert_allclose(high / low, 16, rtol=1e-6)
+
+
+@pytest.mark.parametrize(("name", "bound"), [("pixel6", 0.04), ("galaxy-s22", 0.105)])
+def test_the_line_in_iso_describes_the_published_gain(name, bound):
+    profile = load_profile(name)
+    iso = np.array(profile.iso)
+    for k in profile.k.T:
+        offset, slope = k_law(iso, k)
+        assert np.max(np.abs((offset + slope * iso) / k - 1)) < bound
+
+
+@pytest.mark.parametrize("name", profile_names())
+def test_a_published_iso_that_is_left_out_is_predicted(name):
+    profile = load_profile(name)
+    for left_out in range(1, len(profile.iso)):
+        keep = np.arange(len(profile.iso)) != left_out
+        rest = replace(
+            profile, iso=tuple(np.array(profile.iso)[keep]), k=profile.k[keep], sigma2=profile.sigma2[keep]
+        )
+        np.testing.assert_allclose(rest.level(profile.iso[left_out]).k, profile.k[left_out], rtol=0.08)
+
+
+def test_laws_recover_the_coefficients_they_were_made_from():
+    iso = np.geomspace(50, 6400, 8)
+    np.testing.assert_allclose(k_law(iso, 3e-5 + 7e-7 * iso), [3e-5, 7e-7], rtol=1e-6)
+    floor = 1e-7
+    made = floor + 2e-7 + 3e-10 * iso + 4e-12 * iso**2
+    np.testing.assert_allclose(sigma2_law(iso, made, floor, 0.0), [2e-7, 3e-10, 4e-12], rtol=1e-6)
+
+
+def test_one_iso_is_a_profile_too(tmp_path):
+    path = tmp_path / "one.yaml"
+    path.write_text(GOOD[: GOOD.index("  - iso: 400")])
+    profile = load_profile(path)
+    np.testing.assert_allclose(profile.level(100).k, [1.0e-4, 1.1e-4, 1.2e-4, 1.3e-4])
+    np.testing.assert_allclose(profile.level(200).k, 2 * profile.k[0], rtol=1e-6)
+    assert 2 < profile.level(200).sigma2[0] / profile.level(100).sigma2[0] < 4
+
+
+def test_own_profile_by_path(tmp_path):
+    path = tmp_path / "mine.yaml"
+    path.write_text(GOOD)
+    profile = load_profile(str(path))
+    assert (profile.name, profile.cfa, profile.span) == ("mine", "RGGB", 3839)
+    np.testing.assert_allclose(profile.level(400).k, [4.0e-4, 4.4e-4, 4.8e-4, 5.2e-4])
+    assert profile.xyz_to_camera.shape == (4, 3, 3)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("cfa: RGGB", "cfa: RGBG", "cfa"),
+        ("cfa: RGGB\n", "", "missing key cfa"),
+        ("cfa: RGGB", "cfa: RGGB\ncolour: red", "unknown key colour"),
+        ("white_level: 4095", "white_level: 4096", "12 bits"),
+        ("black_level: 256", "black_level: 5000", "black_level"),
+        ("black_level: 256", "black_level: 256.5", "black_level"),
+        ("iso: 400", "iso: 100", "rising"),
+        ("iso: 400", "iso: many", r"levels\[1\].iso"),
+        ("1.3e-04]", "]", r"levels\[0\].k "),
+        ("1.3e-04]", "1e-04]", "1.0e-05"),
+        ("[1.0e-04, 1.1", "[-1.0e-04, 1.1", "positive"),
+        ("[4.0e-06", "[.nan", r"levels\[1\].sigma2"),
+        ("levels:", "levels: [", "YAML"),
+        ("    sigma2: [1.0", "    k_dn: [1.0, 1.0, 1.0, 1.0]\n    sigma2: [1.0", "k_dn"),
+        ("cfa: RGGB", "cfa: RGGB\nxyz_to_camera: [[1, 2], [3]]", "xyz_to_camera"),
+    ],
+)
+def test_a_wrong_profile_names_file_and_key(tmp_path, old, new, words):
+    path = tmp_path / "wrong.yaml"
+    assert old in GOOD
+    path.write_text(GOOD.replace(old, new, 1))
+    with pytest.raises(FsidError, match=words) as caught:
+        load_profile(path)
+    assert "wrong.yaml" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_an_unknown_name_lists_the_known_ones():
+    with pytest.raises(FsidError, match="pixel6"):
+        load_profile("pixel7")
+
+
+def test_a_profile_that_is_no_text_is_named(tmp_path):
+    path = tmp_path / "image.yaml"
+    path.write_bytes(bytes(range(256)))
+    with pytest.raises(FsidError, match=r"image\.yaml"):
+        load_profile(path)
+
+
+def test_a_profile_travels_to_workers():
+    profile = load_profile("galaxy-s22")
+    level = profile.level(1234)
+    assert pickle.loads(pickle.dumps(profile)).level(1234) == level
+
+
+@pytest.mark.parametrize("iso", [0, -100, float("nan")])
+def test_iso_must_be_positive(iso):
+    with pytest.raises(FsidError, match="ISO"):
+        load_profile("pixel6").level(iso)

@@ -1,0 +1,161 @@
+"""Light on the sensor: unprocessing inverts processing, the linear path is linear, grey stays grey."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fsid.errors import FsidError
+from fsid.sensor import (
+    camera_to_srgb_matrix,
+    colour_rand,
+    expose,
+    exposure_rand,
+    linear_to_camera,
+    process,
+    srgb_decode,
+    srgb_encode,
+    srgb_to_camera_matrix,
+    unprocess,
+)
+from fsid.sensor.colour import SRGB_TO_XYZ, published_matrices
+from fsid.sensor.tone import inverse_tone_curve, tone_curve
+
+seeds = st.integers(0, 2**32 - 1)
+
+
+@settings(max_examples=40, deadline=None)
+@given(seeds)
+def test_process_inverts_unprocess_where_nothing_clips(seed):
+    rng = np.random.default_rng(seed)
+    matrix, gains = colour_rand(rng, published_matrices())
+    exposure = rng.uniform(0.6, 1.0)
+    # In gamut: muted colours map to positive camera RGB below the highlight inflection.
+    srgb = np.clip(rng.uniform(0.1, 0.85, (8, 10, 1)) + rng.uniform(-0.05, 0.05, (8, 10, 3)), 0, 1)
+    camera = unprocess(srgb, matrix, gains, exposure)
+    assert camera.min() > 0
+    assert camera.max() < 1
+    np.testing.assert_allclose(process(camera, matrix, gains, exposure), srgb, atol=1e-4)
+
+
+@settings(max_examples=40, deadline=None)
+@given(seeds)
+def test_white_stays_saturated_and_dark_is_divided_by_the_gains(seed):
+    rng = np.random.default_rng(seed)
+    matrix, gains = colour_rand(rng, published_matrices())
+    np.testing.assert_allclose(unprocess(np.ones((2, 2, 3)), matrix, gains, 0.8), 1, atol=1e-5)
+    grey = unprocess(np.full((2, 2, 3), 0.4), matrix, gains, 0.8)
+    light = srgb_decode(inverse_tone_curve(np.float32(0.4)))
+    np.testing.assert_allclose(grey * gains, 0.8 * light, rtol=1e-4)
+
+
+def test_highlights_never_get_darker_than_the_light_below_them():
+    matrix, gains = published_matrices()[1], (2.2, 1.0, 1.7)
+    ramp = np.linspace(0, 1, 256)[None, :, None] * np.ones((1, 1, 3))
+    camera = unprocess(ramp, matrix, gains)
+    assert np.all(np.diff(camera, axis=1) >= -1e-6)
+
+
+@settings(max_examples=40, deadline=None)
+@given(seeds)
+def test_the_path_of_rendered_light_is_exactly_linear(seed):
+    rng = np.random.default_rng(seed)
+    matrix, gains = colour_rand(rng, published_matrices())
+    a, b = rng.uniform(0.2, 0.4, (2, 4, 4, 3))
+    total = linear_to_camera(a + 0.5 * b, matrix, gains)
+    parts = linear_to_camera(a, matrix, gains) + 0.5 * linear_to_camera(b, matrix, gains)
+    np.testing.assert_allclose(total, parts, atol=1e-6)
+
+
+def test_grey_light_saturates_green_first_then_red_and_blue():
+    matrix, gains = published_matrices()[0], (2.0, 1.0, 1.6)
+    light = np.array([0.5, 1.0, 1.6, 2.0, 9.0])[None, :, None] * np.ones((1, 1, 3))
+    camera = linear_to_camera(light, matrix, gains)[0]
+    np.testing.assert_allclose(camera[:, 1], [0.5, 1, 1, 1, 1], atol=1e-6)
+    np.testing.assert_allclose(camera[:, 2], [0.5 / 1.6, 1 / 1.6, 1, 1, 1], atol=1e-6)
+    np.testing.assert_allclose(camera[:, 0], [0.25, 0.5, 0.8, 1, 1], atol=1e-6)
+
+
+def test_tone_curve_and_srgb_are_inverted():
+    v = np.linspace(0, 1, 4097, dtype=np.float32)
+    np.testing.assert_allclose(tone_curve(inverse_tone_curve(v)), v, atol=2e-6)
+    np.testing.assert_allclose(srgb_encode(srgb_decode(v)), v, atol=2e-6)
+    assert tone_curve(np.float32(0.5)) == pytest.approx(0.5)
+    assert srgb_decode(np.float32(0.5)) == pytest.approx(0.21404114, abs=1e-6)  # IEC 61966-2-1
+    assert srgb_encode(np.float32(-0.1)) == 0
+    assert srgb_encode(np.float32(7.0)) == pytest.approx(1)
+
+
+def test_matrices_keep_grey_and_invert_each_other():
+    for matrix in published_matrices():
+        to_camera = srgb_to_camera_matrix(matrix)
+        np.testing.assert_allclose(to_camera.sum(axis=1), 1, rtol=1e-12)
+        np.testing.assert_allclose(camera_to_srgb_matrix(matrix) @ to_camera, np.eye(3), atol=1e-12)
+    np.testing.assert_allclose(SRGB_TO_XYZ.sum(axis=1), [0.9505, 1.0, 1.089], atol=1e-3)  # D65 white
+
+
+def test_colour_rand_blends_inside_the_published_cameras():
+    rng = np.random.default_rng(0)
+    matrices = published_matrices()
+    draws = [colour_rand(rng, matrices) for _ in range(300)]
+    blends = np.array([matrix for matrix, _ in draws])
+    assert np.all(blends >= matrices.min(axis=0) - 1e-12)
+    assert np.all(blends <= matrices.max(axis=0) + 1e-12)
+    assert np.all(blends.std(axis=0)[0] > 0)
+    red, green, blue = np.array([gains for _, gains in draws]).T
+    assert 1.9 <= red.min() < 1.95 < 2.35 < red.max() <= 2.4
+    assert 1.5 <= blue.min() < 1.55 < 1.85 < blue.max() <= 1.9
+    assert np.all(green == 1)
+
+
+def _natural_light(seed: int) -> np.ndarray:
+    """Log-normal radiance with smooth structure and a few lamps, of any absolute level."""
+    rng = np.random.default_rng(seed)
+    small = rng.normal(0, 1.3, (24, 32))
+    light = np.exp(np.kron(small, np.ones((8, 8)))) * rng.uniform(0.01, 100)
+    light[:4, :6] *= 1000
+    return (light[..., None] * rng.uniform(0.6, 1.2, (1, 1, 3))).astype(np.float32)
+
+
+def test_exposure_clips_few_highlights_and_places_the_middle_where_it_says():
+    clipped, middle = [], []
+    for seed in range(60):
+        radiance = _natural_light(seed)
+        luminance = expose(np.random.default_rng(seed), radiance) @ SRGB_TO_XYZ[1]
+        clipped.append(np.mean(luminance > 1))
+        middle.append(np.median(luminance))
+    assert max(clipped) <= 0.0305
+    assert np.mean(np.array(clipped) > 0) > 0.5
+    assert max(middle) <= 0.2501
+    assert np.median(middle) > 0.03
+
+
+@settings(max_examples=20, deadline=None)
+@given(seeds, st.floats(1e-3, 1e3))
+def test_exposure_cancels_the_absolute_level_of_the_light(seed, factor):
+    radiance = _natural_light(1)
+    one = exposure_rand(np.random.default_rng(seed), radiance)
+    other = exposure_rand(np.random.default_rng(seed), radiance * np.float32(factor))
+    assert other * factor == pytest.approx(one, rel=1e-4)
+
+
+def test_a_black_frame_stays_black_and_a_mostly_black_one_is_exposed_for_its_light():
+    black = np.zeros((8, 8, 3), np.float32)
+    assert np.all(expose(np.random.default_rng(0), black) == 0)
+    lamp = np.zeros((20, 20, 3), np.float32)
+    lamp[:5] = 50
+    assert expose(np.random.default_rng(0), lamp).max() == pytest.approx(1, rel=1e-3)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_radiance_that_is_no_number_is_refused(bad):
+    with pytest.raises(FsidError, match="radiance"):
+        expose(np.random.default_rng(0), np.full((4, 4, 3), bad))
+
+
+@pytest.mark.parametrize(
+    "photo", [np.full((4, 4, 3), 200), np.full((4, 4, 3), np.nan), np.zeros((4, 4)), np.zeros((4, 4, 4))]
+)
+def test_a_photo_out_of_range_or_shape_is_refused(photo):
+    with pytest.raises(FsidError, match="photo"):
+        unprocess(photo, np.eye(3), (2.0, 1.0, 1.5))
