@@ -59,7 +59,7 @@ def noise(
 
 
 def level(field: np.ndarray, softness: float = 1.0) -> np.ndarray:
-    """A mean 0, variance 1 field to [0, 1] by the normal distribution: uniform for softness 1, masks below."""
+    """Mean 0, variance 1 to [0, 1] by the normal distribution: uniform for softness 1, masks below."""
     return ndtr(field / np.float32(softness))
 
 
@@ -134,7 +134,7 @@ def scratches(
     angle_deg: float = 0.0,
     spread_deg: float = 180.0,
 ) -> np.ndarray:
-    """(S, S) float32 in [0, 1]: `count` hair lines about one texel wide, `length` of a tile long on average."""
+    """(S, S) float32 in [0, 1]: `count` hair lines a texel wide, `length` of a tile long on average."""
     wide = size * 2
     start = rng.random((count, 2)) * wide
     angle = np.radians(spread_deg * (rng.random(count) - 0.5))

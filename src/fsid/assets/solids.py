@@ -265,7 +265,9 @@ def _box_template(steps: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     su, sv = (grid.ravel() for grid in np.meshgrid(side, side))
     one = np.ones_like(u)
     grid = _grid_faces(len(slope), len(slope))
-    directions, signs, faces = [], [], []
+    directions: list[np.ndarray] = []
+    signs: list[np.ndarray] = []
+    faces: list[np.ndarray] = []
     for axis in range(3):
         for sign in (1.0, -1.0):
             order = [(axis + 1) % 3, (axis + 2) % 3, axis]

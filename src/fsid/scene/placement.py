@@ -64,7 +64,7 @@ def scattered(
     for rng, mesh in zip(rngs, meshes, strict=True):
         turn = rng.integers(config.rotation_steps, size=3) * (360.0 / config.rotation_steps)
         size_m = log_uniform_rand(rng, config.object_size_m)
-        shape = np.exp(rng.uniform(*np.log(config.stretch), size=3))
+        shape = np.array([log_uniform_rand(rng, config.stretch) for _ in range(3)])
         shape *= size_m / (np.ptp(mesh.vertices, axis=0) * shape).max()
         floating = rng.random() < config.floating_share
         spots = _spots_rand(rng, room_m, focus_m, config.spread_m)

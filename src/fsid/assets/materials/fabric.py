@@ -97,7 +97,7 @@ def knit(rng: np.random.Generator, variant: int, size: int) -> Layers:
 @material_family("carpet", tile_m=0.4, relief_m=0.006)
 def carpet(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """Loop or cut pile of several yarn colours, with a woven figure for odd variants."""
-    near, second, value = cells(rng, size, (72, 110, 90, 150)[variant], 0.8)
+    near, _, value = cells(rng, size, (72, 110, 90, 150)[variant], 0.8)
     tuft = np.clip(1 - 1.3 * near, 0, 1)
     fibre = noise(rng, size, 0.0, low=size / 6)
     trodden = noise(rng, size, 1.8, low=2)

@@ -58,7 +58,7 @@ def leaves(rng: np.random.Generator, variant: int, size: int) -> Layers:
     return Layers(
         mix=np.clip(0.7 * tone + 0.3 * across, 0, 1),
         pattern=np.maximum(0.8 * spots, edge(tone, 0.9, 0.02)),
-        detail=0.16 + 0.36 * depth + 0.08 * (across - 0.5) + 0.03 * vein,
+        detail=0.16 + 0.36 * depth + 0.3 * (across - 0.5) + 0.03 * vein,
         roughness=0.35 + 0.25 * tone,
         height=np.clip(depth + 0.02 * vein, 0, 1),
     )

@@ -104,12 +104,14 @@ def cushion(rng: np.random.Generator) -> Parts:
     c, s = np.cos(angle), np.sin(angle)
     edge = np.c_[c, s] / (np.abs(c) ** pinch + np.abs(s) ** pinch)[:, None] ** (1 / pinch)
     seam = sweep(np.c_[edge * (x / 2, y / 2), np.zeros(96)], rng.uniform(0.003, 0.007), 8, closed=True)
-    return {"cover": [pillow(x, y, z, pinch, rng)], "piping": [seam]}
+    return {"cover": [pillow(x, y, z, pinch, rng, 4)], "piping": [seam]}
 
 
-def pillow(x: float, y: float, z: float, pinch: float, rng: np.random.Generator | None = None) -> Solid:
+def pillow(
+    x: float, y: float, z: float, pinch: float, rng: np.random.Generator | None = None, level: int = 3
+) -> Solid:
     """Superellipse outline of exponent `pinch` with a puffed, round section; wrinkled when `rng` is given."""
-    d = ball_directions(4)
+    d = ball_directions(level)
     flat = np.hypot(d[:, 0], d[:, 1]) + 1e-9
     outline = flat / (np.abs(d[:, 0]) ** pinch + np.abs(d[:, 1]) ** pinch + 1e-12) ** (1 / pinch)
     stretch = 1 + (outline - 1) * flat**2
@@ -118,7 +120,7 @@ def pillow(x: float, y: float, z: float, pinch: float, rng: np.random.Generator 
         for _ in range(6):
             wave = rng.normal(0, 5, 3)
             radii += 0.012 * np.sin(d @ wave + rng.uniform(0, 6.3))
-    solid = ball(radii, 4)
+    solid = ball(radii, level)
     shaped = Solid(solid.vertices * np.c_[stretch, stretch, np.ones(len(d))], solid.normals, solid.faces)
     return _renormalised(shaped.stretched(x / 2, y / 2, z / 2))
 

@@ -98,7 +98,9 @@ def _leg(rng: np.random.Generator, width: float, height: float) -> Solid:
 def turned_post(rng: np.random.Generator, radius: float, height: float, segments: int) -> Solid:
     """Lathe-turned column: a smooth random profile with a few beads, `radius` at its widest."""
     z = np.linspace(0, 1, 40)
-    wave = sum(rng.uniform(0.2, 1) * np.cos(2 * np.pi * (k * z + rng.random())) / k for k in (1, 2, 3, 5))
+    wave = np.zeros_like(z)
+    for k in (1, 2, 3, 5):
+        wave += rng.uniform(0.2, 1) * np.cos(2 * np.pi * (k * z + rng.random())) / k
     wave = 0.45 + 0.55 * (wave - wave.min()) / np.ptp(wave)
     for centre in rng.uniform(0.1, 0.9, rng.integers(0, 4)):
         wave += 0.35 * np.exp(-(((z - centre) / 0.02) ** 2))
