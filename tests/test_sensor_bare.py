@@ -75,7 +75,12 @@ def test_a_file_that_does_not_fit_is_named(tmp_path, name, write, size, words):
 
 @pytest.mark.parametrize(
     ("change", "words"),
-    [({"cfa": "RGB"}, "cfa"), ({"black_level": 5000}, "black"), ({"white_level": 70000}, "65535")],
+    [
+        ({"cfa": "RGB"}, "cfa"),
+        ({"black_level": 5000}, "black"),
+        ({"white_level": 70000}, "65535"),
+        ({"white_balance": (0, 1, 1)}, "white_balance"),
+    ],
 )
 def test_a_camera_that_cannot_be_is_refused(tmp_path, change, words):
     np.save(tmp_path / "a.npy", DN)

@@ -131,6 +131,11 @@ def test_level_rand_refuses_a_range_without_iso(iso_range):
         level_rand(np.random.default_rng(0), load_profile("pixel6"), iso_range)
 
 
+def test_nan_is_refused():
+    with pytest.raises(FsidError, match="NaN"):
+        to_dn(_flat(float("nan"), side=4))
+
+
 def test_levels_that_no_camera_has_are_refused():
     raw = Raw(
         np.zeros((2, 2), np.float32), "RGGB", 1023, 64, (1.0, 1.0, 1.0), np.eye(3), camera="upside down"

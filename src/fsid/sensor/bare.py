@@ -44,6 +44,8 @@ def read_mosaic(
     path = Path(path)
     check_cfa(cfa, f"{path}: cfa")
     check_levels(black_level, white_level, str(path))
+    if len(white_balance) != 3 or not min(white_balance) > 0:
+        raise FsidError(f"{path}: white_balance {white_balance} must be three positive gains")
     if not path.is_file():
         raise FsidError(f"{path}: no such mosaic file")
     dn = _read(path, cfa, width, height)

@@ -131,6 +131,8 @@ def _from_libraw(file: rawpy.RawPy, tags: dict[int, Values], path: Path) -> Raw:
     tile = file.raw_colors_visible[:2, :2]
     dn = file.raw_image_visible
     dn = dn[: dn.shape[0] - dn.shape[0] % 2, : dn.shape[1] - dn.shape[1] % 2]
+    if dn.size == 0:
+        raise FsidError(f"{path}: is smaller than one 2x2 tile of its filter pattern")
     blacks = np.asarray(file.black_level_per_channel, np.float64)
     black, white = round(float(blacks.mean())), int(file.white_level)
     if not 0 <= black < white:

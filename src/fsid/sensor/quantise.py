@@ -17,8 +17,10 @@ MAX_DN = 65535
 
 
 def to_dn(raw: Raw) -> np.ndarray:
-    """Integers that `raw`'s camera would have stored: (H, W) uint16, 0..white_level."""
+    """Integers that `raw`'s camera would have stored: (H, W) uint16, 0..white_level. FsidError for NaN."""
     check_levels(raw.black_level, raw.white_level, raw.camera)
+    if np.isnan(np.min(raw.mosaic)):
+        raise FsidError(f"{raw.camera}: the image holds NaN, which no file can store")
     dn = raw.mosaic * np.float32(raw.white_level - raw.black_level)
     dn += np.float32(raw.black_level)
     np.rint(dn, out=dn)
