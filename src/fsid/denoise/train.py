@@ -51,14 +51,14 @@ def train(
     """Train on `data_dir`'s shards; config, checkpoint, history, model go to `run_dir`. Path of the model.
 
     A run that is in `run_dir` already goes on from its checkpoint; it must have been started with the same
-    config. resume: insist that there is one. progress(done, steps) is called instead of showing the live line.
+    config. resume: insist that there is one. progress(done, steps) is called in place of the live line.
     Raises FsidError for unusable data or settings, another run in `run_dir`, or a training that diverges.
     """
-    _prepare_run(run_dir, config, resume)
     if config.threads:
         torch.set_num_threads(config.threads)
     accelerator = Accelerator(mixed_precision="bf16" if torch.cuda.is_available() else "no")
     patches = PatchDataset(data_dir, _patch_config(config), config.seed, accelerator.process_index)
+    _prepare_run(run_dir, config, resume)
     torch.manual_seed(config.seed)
     net, optimizer = _prepare(accelerator, config)
     bare = accelerator.unwrap_model(net)

@@ -1,0 +1,45 @@
+"""In the stabilised domain every camera's noise is N(0, 1), and nothing is lost on the way."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch")
+
+from hypothesis import given  # noqa: E402
+from hypothesis import strategies as st  # noqa: E402
+
+from fsid.denoise.stabilise import stabilise, unstabilise  # noqa: E402
+from fsid.sensor import load_profile  # noqa: E402
+
+gains = st.floats(0, 0.05)
+
+
+def full(value: float) -> torch.Tensor:
+    return torch.full((1, 4, 1, 1), value, dtype=torch.double)
+
+
+@given(k=gains, sigma2=st.floats(0, 1e-2), x=st.lists(st.floats(-0.3, 1.5), min_size=1, max_size=8))
+def test_round_trip_and_order(k: float, sigma2: float, x: list[float]) -> None:
+    image = torch.tensor(sorted(x), dtype=torch.double).expand(1, 4, 1, len(x))
+    y = stabilise(image, full(k), full(sigma2))
+    torch.testing.assert_close(unstabilise(y, full(k), full(sigma2)), image, atol=1e-9, rtol=1e-9)
+    assert (y.diff(dim=-1) >= 0).all()
+
+
+@given(sigma2=st.floats(1e-6, 1e-2), x=st.floats(-0.3, 1.5))
+def test_without_shot_noise_it_is_a_division_by_sigma(sigma2: float, x: float) -> None:
+    y = stabilise(full(x), full(0.0), full(sigma2))
+    assert y[0, 0, 0, 0].item() == pytest.approx(x / sigma2**0.5, rel=1e-5)
+
+
+@pytest.mark.parametrize("camera", ["pixel6", "galaxy-s22"])
+@pytest.mark.parametrize("iso", [400, 1600, 6400])
+def test_unit_variance_at_every_brightness(camera: str, iso: float, rng: np.random.Generator) -> None:
+    level = load_profile(camera).level(iso)
+    k, sigma2 = (torch.tensor(v, dtype=torch.double)[None, :, None, None] for v in (level.k, level.sigma2))
+    for x in (0.02, 0.1, 0.4, 0.9):
+        noise = torch.from_numpy(rng.standard_normal((1, 4, 100, 100)))
+        y = stabilise(x + torch.sqrt(k * x + sigma2) * noise, k, sigma2)
+        torch.testing.assert_close(y.var((0, 2, 3)), torch.ones(4, dtype=torch.double), atol=0.08, rtol=0)

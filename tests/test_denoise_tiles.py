@@ -1,0 +1,101 @@
+"""Tiles are an implementation detail: no size, pattern or tile changes what comes out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch")
+
+from fsid.denoise import Denoiser, ModelCard, NetworkConfig, RawDenoiser, denoise_raw  # noqa: E402
+from fsid.errors import FsidError  # noqa: E402
+from fsid.sensor import CFA_PATTERNS, NoiseLevel, Raw, load_profile  # noqa: E402
+
+LEVEL = load_profile("pixel6").level(3200)
+
+
+def raw(rng: np.random.Generator, height: int, width: int, cfa: str = "RGGB") -> Raw:
+    ramp = (
+        np.linspace(0, 0.8, width, dtype=np.float32) * np.linspace(0.3, 1, height, dtype=np.float32)[:, None]
+    )
+    noisy = ramp + 0.03 * rng.standard_normal((height, width), dtype=np.float32)
+    return Raw(noisy, cfa, 64, 1023, (2.0, 1.0, 1.5), np.eye(3), "test", 3200, LEVEL)
+
+
+def denoiser(network: NetworkConfig | None = None, patch_px: int = 16, active: bool = True) -> Denoiser:
+    torch.manual_seed(0)
+    network = network or NetworkConfig(width=8)
+    net = RawDenoiser(network)
+    if active:
+        for name, parameter in net.named_parameters():
+            if name.endswith(("beta", "gamma", "ending.weight")):
+                torch.nn.init.normal_(parameter, std=0.3)
+    return Denoiser(net.eval().requires_grad_(False), ModelCard(network, patch_px), torch.device("cpu"))
+
+
+@pytest.mark.parametrize("network", [NetworkConfig(width=8), NetworkConfig(4, (1, 1, 1), 1, (1, 1, 1))])
+@pytest.mark.parametrize(("height", "width", "cfa"), [(130, 202, "RGGB"), (122, 146, "GBRG")])
+def test_tiled_equals_untiled(
+    rng: np.random.Generator, network: NetworkConfig, height: int, width: int, cfa: str
+) -> None:
+    noisy, model = raw(rng, height, width, cfa), denoiser(network)
+    whole = denoise_raw(noisy, model, tile_px=4096).mosaic
+    assert np.abs(whole - noisy.mosaic).mean() > 1e-3  # the network does something that could differ
+    for tile_px in (16, 33, 100):
+        np.testing.assert_allclose(
+            denoise_raw(noisy, model, tile_px=tile_px).mosaic, whole, atol=1e-4, rtol=0
+        )
+
+
+@pytest.mark.parametrize("cfa", CFA_PATTERNS)
+@pytest.mark.parametrize(("height", "width"), [(2, 2), (6, 10), (34, 50)])
+def test_the_identity_network_returns_every_pixel_in_place(
+    rng: np.random.Generator, cfa: str, height: int, width: int
+) -> None:
+    noisy = raw(rng, height, width, cfa)
+    clean = denoise_raw(noisy, denoiser(active=False), tile_px=8)
+    np.testing.assert_allclose(clean.mosaic, noisy.mosaic, atol=1e-5)
+    for name in ("cfa", "black_level", "white_level", "white_balance", "xyz_to_camera", "camera", "iso"):
+        assert getattr(clean, name) is getattr(noisy, name)
+    assert clean.noise is None
+
+
+def test_the_network_sees_one_geometry_whatever_the_pattern(rng: np.random.Generator) -> None:
+    """The same scene with an odd first column cut off (RGGB becomes GRBG) is denoised to the same pixels.
+
+    The scene's outer columns are mirror images, so that padding brings back just what the cut took away.
+    """
+    model, whole = denoiser(patch_px=64), raw(rng, 64, 64)
+    cut = replace(whole, mosaic=np.ascontiguousarray(whole.mosaic[:, 1:-1]), cfa="GRBG")
+    mirrored = replace(whole, mosaic=np.pad(cut.mosaic, ((0, 0), (1, 1)), mode="reflect"))
+    expected = denoise_raw(mirrored, model).mosaic[:, 1:-1]
+    np.testing.assert_allclose(denoise_raw(cut, model).mosaic, expected, atol=1e-4)
+
+
+def test_a_small_image_is_what_the_bare_network_makes_of_it(rng: np.random.Generator) -> None:
+    noisy, model = raw(rng, 64, 64), denoiser(patch_px=32)
+    packed = np.stack([noisy.mosaic[r::2, c::2] for r in (0, 1) for c in (0, 1)])
+    k, sigma2 = torch.tensor([LEVEL.k]), torch.tensor([LEVEL.sigma2])
+    expected = model.net(torch.from_numpy(packed)[None], k, sigma2)[0].numpy()
+    clean = denoise_raw(noisy, model, tile_px=8).mosaic
+    np.testing.assert_allclose(clean[::2, 1::2], expected[1], atol=1e-5)
+
+
+def test_progress_counts_tiles(rng: np.random.Generator) -> None:
+    calls: list[tuple[int, int]] = []
+    denoise_raw(raw(rng, 64, 96), denoiser(), tile_px=16, progress=lambda *done: calls.append(done))
+    assert calls == [(i, 6) for i in range(1, 7)]
+
+
+def test_bad_input_is_named(rng: np.random.Generator) -> None:
+    noisy, model = raw(rng, 32, 32), denoiser()
+    with pytest.raises(FsidError, match="noise level of this RAW is unknown"):
+        denoise_raw(replace(noisy, noise=None), model)
+    with pytest.raises(FsidError, match="not negative"):
+        denoise_raw(noisy, model, NoiseLevel((-1e-3,) * 4, (0.0,) * 4))
+    broken = noisy.mosaic.copy()
+    broken[3, 3] = np.nan
+    with pytest.raises(FsidError, match="NaN"):
+        denoise_raw(replace(noisy, mosaic=broken), model)

@@ -1,0 +1,152 @@
+"""Training learns, can be killed at any moment, and then ends with the same bits."""
+
+from __future__ import annotations
+
+import io
+import signal
+import subprocess
+import sys
+from dataclasses import replace
+from importlib.resources import as_file, files
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch")
+
+from safetensors.torch import load_file  # noqa: E402
+
+from fsid.config import load_settings  # noqa: E402
+from fsid.dataset.shards import shard_path, write_shard  # noqa: E402
+from fsid.denoise import (  # noqa: E402
+    NetworkConfig,
+    TrainConfig,
+    denoise_raw,
+    load_history,
+    load_model,
+    train,
+)
+from fsid.denoise.train import learning_rate  # noqa: E402
+from fsid.errors import FsidError  # noqa: E402
+from fsid.sensor import Raw, add_noise, clean_levels, load_profile, write_dng  # noqa: E402
+
+CONFIG = TrainConfig(
+    network=NetworkConfig(width=4, encoder_blocks=(1,), middle_blocks=1, decoder_blocks=(1,)),
+    steps=8,
+    batch=2,
+    patch_px=16,
+    learning_rate=5e-3,
+    warmup_steps=2,
+    log_every=3,
+    checkpoint_every=2,
+    threads=1,
+)
+
+KILLED_TRAINING = """
+import os, signal, sys
+from pathlib import Path
+from fsid.config import load_settings
+from fsid.denoise import TrainConfig, train
+def progress(done, steps):
+    if done == 5:
+        os.kill(os.getpid(), signal.SIGKILL)
+data, run, config = map(Path, sys.argv[1:])
+train(data, run, load_settings(TrainConfig, config), progress=progress)
+"""
+
+
+def patches_of_colour(rng: np.random.Generator, size: int = 96) -> Raw:
+    """Smooth blobs: clean images from which denoising can be learnt in seconds."""
+    from scipy.ndimage import gaussian_filter
+
+    blobs = gaussian_filter(rng.standard_normal((size, size)), 6)
+    x = np.float32(0.3) + np.float32(0.2) * np.tanh(8 * blobs).astype(np.float32)
+    return Raw(x, "GBRG", 64, 1023, (2.0, 1.0, 1.5), np.eye(3))
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    rng = np.random.default_rng(1)
+    folder = tmp_path_factory.mktemp("data")
+
+    def sample(number: int) -> tuple[str, dict[str, bytes]]:
+        buffer = io.BytesIO()
+        write_dng(buffer, clean_levels(patches_of_colour(rng)))
+        return f"{number:08d}", {"clean.dng": buffer.getvalue()}
+
+    write_shard(shard_path(folder, 0), [sample(n) for n in range(4)])
+    return folder
+
+
+def test_training_denoises(data: Path, tmp_path: Path) -> None:
+    network = replace(CONFIG.network, width=8)
+    short = {"steps": 150, "batch": 4, "warmup_steps": 10, "learning_rate": 1e-2, "ema_decay": 0.9}
+    config = replace(CONFIG, network=network, log_every=10, **short)
+    model = load_model(train(data, tmp_path / "run", config, quiet=True))
+    rng = np.random.default_rng(2)
+    clean, level = patches_of_colour(rng), load_profile("pixel6").level(3200)
+    noisy = add_noise(rng, clean, level)
+    errors = [np.mean((image.mosaic - clean.mosaic) ** 2) for image in (noisy, denoise_raw(noisy, model))]
+    assert 10 * np.log10(errors[0] / errors[1]) > 4
+    steps, losses, psnrs = load_history(tmp_path / "run")
+    assert steps == list(range(10, 151, 10))
+    assert losses[-1] < losses[0]
+    assert psnrs[-1] > psnrs[0]
+
+
+def test_a_killed_training_ends_with_the_same_bits(data: Path, tmp_path: Path) -> None:
+    undisturbed = train(data, tmp_path / "a", CONFIG, quiet=True)
+    arguments = [str(data), str(tmp_path / "b"), str(tmp_path / "a" / "config.yaml")]
+    killed = subprocess.run([sys.executable, "-c", KILLED_TRAINING, *arguments], check=False)
+    assert killed.returncode == -signal.SIGKILL
+    assert not (tmp_path / "b" / "model.safetensors").exists()
+    resumed = train(data, tmp_path / "b", CONFIG, resume=True, quiet=True)
+    assert resumed.read_bytes() == undisturbed.read_bytes()
+    for name in ("checkpoint.safetensors", "history.json"):
+        assert (tmp_path / "b" / name).read_bytes() == (tmp_path / "a" / name).read_bytes()
+    weights = load_file(undisturbed)
+    assert not torch.equal(weights["net.intro.weight"], torch.zeros_like(weights["net.intro.weight"]))
+    assert train(data, tmp_path / "b", CONFIG, quiet=True).read_bytes() == undisturbed.read_bytes()
+
+
+def test_progress_replaces_the_live_line_and_quiet_is_silent(
+    data: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    calls: list[tuple[int, int]] = []
+    train(data, tmp_path / "a", CONFIG, progress=lambda *done: calls.append(done))
+    assert calls == [(step, 8) for step in range(1, 9)]
+    train(data, tmp_path / "b", CONFIG, quiet=True)
+    assert capfd.readouterr() == ("", "")
+    train(data, tmp_path / "c", CONFIG)
+    assert "PSNR" in "".join(capfd.readouterr())
+
+
+def test_learning_rate_rises_and_falls() -> None:
+    config = replace(CONFIG, steps=100, warmup_steps=10, learning_rate=1.0, final_rate=0.01)
+    rates = [learning_rate(config, step) for step in range(100)]
+    assert rates[9] == max(rates) == 1.0
+    assert rates[:10] == sorted(rates[:10])
+    assert rates[9:] == sorted(rates[9:], reverse=True)
+    assert rates[-1] == pytest.approx(0.01, rel=0.1)
+
+
+@pytest.mark.parametrize("name", ["nafnet-tiny", "nafnet-small"])
+def test_shipped_configs_are_valid(name: str) -> None:
+    with as_file(files("fsid.configs").joinpath(f"{name}.yaml")) as file:
+        assert load_settings(TrainConfig, file).steps > 1
+
+
+def test_bad_input_is_named(data: Path, tmp_path: Path) -> None:
+    with pytest.raises(FsidError, match="no training to resume"):
+        train(data, tmp_path / "run", CONFIG, resume=True)
+    with pytest.raises(FsidError, match="no-such"):
+        train(tmp_path / "no-such", tmp_path / "run", CONFIG, quiet=True)
+    train(data, tmp_path / "run", replace(CONFIG, steps=2), quiet=True)
+    with pytest.raises(FsidError, match="another steps, seed"):
+        train(data, tmp_path / "run", replace(CONFIG, seed=1), quiet=True)
+    (tmp_path / "run" / "checkpoint.safetensors").write_bytes(b"broken")
+    with pytest.raises(FsidError, match=r"checkpoint\.safetensors"):
+        train(data, tmp_path / "run", replace(CONFIG, steps=2), quiet=True)
+    with pytest.raises(FsidError, match="learning_rate"):
+        replace(CONFIG, learning_rate=0.0)
