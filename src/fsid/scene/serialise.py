@@ -14,6 +14,7 @@ from typing import Any, get_args, get_origin, get_type_hints
 
 from fsid.errors import FsidError
 from fsid.scene.model import Scene
+from fsid.scene.sampler import SURFACES
 
 
 def scene_to_json(scene: Scene) -> str:
@@ -27,7 +28,13 @@ def scene_from_json(text: str) -> Scene:
         data = json.loads(text)
     except json.JSONDecodeError as error:
         raise FsidError(f"scene JSON: not valid at line {error.lineno}: {error.msg}") from None
-    return _read(Scene, data, "scene")
+    scene: Scene = _read(Scene, data, "scene")
+    for key in ("materials", "transforms"):
+        _expect(len(getattr(scene, key)) == len(scene.objects), f"scene.{key}", "as long as scene.objects")
+    if scene.background.kind == "room":
+        named = set(scene.background.materials) == set(SURFACES)
+        _expect(named, "scene.background.materials", f"one material for each of {', '.join(SURFACES)}")
+    return scene
 
 
 def _read(kind: Any, data: Any, where: str) -> Any:

@@ -1,0 +1,133 @@
+"""Laws of material maps: range, tiling, determinism, and detail down to the texel."""
+
+import numpy as np
+import pytest
+
+from fsid.assets import MATERIAL_VARIANTS, bake_material, material_families, material_tile_m
+from fsid.assets.patterns import cells, level, noise, shade, stack, warp
+from fsid.errors import FsidError
+
+MAPS = ("mix", "pattern", "detail", "roughness", "height", "metallic")
+SIZE = 256
+
+
+@pytest.fixture(scope="module")
+def baked():
+    names = material_families()
+    return {(name, v): bake_material(name, v, SIZE) for name in names for v in range(MATERIAL_VARIANTS)}
+
+
+def test_there_are_sixteen_families():
+    assert len(material_families()) >= 16
+
+
+@pytest.mark.parametrize("family", material_families())
+class TestEveryFamily:
+    def test_maps_are_float32_in_range(self, baked, family):
+        for variant in range(MATERIAL_VARIANTS):
+            maps = baked[family, variant]
+            for name in MAPS:
+                field = getattr(maps, name)
+                assert field.shape == (SIZE, SIZE), name
+                assert field.dtype == np.float32, name
+                assert 0 <= field.min() <= field.max() <= 1, name
+            assert maps.relief_m > 0
+            assert maps.tile_m == material_tile_m(family) > 0
+
+    def test_tiles_without_a_seam(self, baked, family):
+        """Across the border, neighbours differ no more than somewhere inside."""
+        for variant in range(MATERIAL_VARIANTS):
+            for name in ("mix", "pattern", "detail", "height"):
+                field = getattr(baked[family, variant], name)
+                for image in (field, field.T):
+                    steps = np.abs(np.roll(image, -1, axis=0) - image).mean(1)
+                    assert steps[-1] <= 1.3 * steps[:-1].max() + 1e-4, (variant, name)
+
+    def test_no_map_is_mostly_clipped(self, baked, family):
+        for variant in range(MATERIAL_VARIANTS):
+            detail = baked[family, variant].detail
+            assert np.mean((detail <= 0) | (detail >= 1)) < 0.12
+
+    def test_family_and_variant_decide_alone(self, baked, family):
+        again = bake_material(family, 1, SIZE)
+        for name in MAPS:
+            np.testing.assert_array_equal(getattr(again, name), getattr(baked[family, 1], name))
+        assert any(
+            not np.array_equal(getattr(again, name), getattr(baked[family, 2], name))
+            for name in ("mix", "height")
+        )
+
+
+def test_most_families_carry_detail_at_the_texel(baked):
+    """RMS difference of neighbouring texels of a typical albedo, relative to its mean."""
+    strengths = []
+    for maps in baked.values():
+        albedo = (0.3 + 0.25 * maps.mix) * (1 - maps.pattern) + 0.1 * maps.pattern
+        albedo = albedo * 2 * maps.detail
+        strengths.append(np.sqrt(np.mean(np.diff(albedo, axis=1) ** 2)) / albedo.mean())
+    assert np.mean(np.array(strengths) > 0.04) > 0.75
+    assert np.mean(np.array(strengths) < 0.03) > 0.03, "homogeneous surfaces exist in reality too"
+
+
+@pytest.mark.parametrize(
+    ("family", "variant", "size", "message"),
+    [
+        ("velvet", 0, 256, "'velvet'"),
+        ("brick", 4, 256, "variant 4"),
+        ("brick", -1, 256, "variant -1"),
+        ("brick", 0, 300, "size 300"),
+        ("brick", 0, 32, "size 32"),
+    ],
+)
+def test_bad_requests_name_the_value(family, variant, size, message):
+    with pytest.raises(FsidError, match=message):
+        bake_material(family, variant, size)
+
+
+def test_noise_has_the_spectrum_it_promises():
+    """Amplitude ~ f^-slope: log power against log frequency falls by 2 slope."""
+    field = noise(np.random.default_rng(0), 512, 1.5)
+    power = np.abs(np.fft.fft2(field)) ** 2
+    f = np.hypot(*np.meshgrid(np.fft.fftfreq(512, 1 / 512), np.fft.fftfreq(512, 1 / 512)))
+    bands = [power[(f > lo) & (f < 1.5 * lo)].mean() for lo in (8, 16, 32, 64, 128)]
+    slope = np.polyfit(np.log2((8, 16, 32, 64, 128)), np.log2(bands), 1)[0]
+    assert slope == pytest.approx(-3.0, abs=0.15)
+    assert field.mean() == pytest.approx(0, abs=1e-4)
+    assert field.std() == pytest.approx(1, abs=1e-3)
+
+
+def test_level_makes_gaussian_noise_uniform():
+    values = level(noise(np.random.default_rng(1), 512, 0.0))
+    counts, _ = np.histogram(values, bins=10, range=(0, 1))
+    np.testing.assert_allclose(counts / values.size, 0.1, atol=0.003)
+
+
+def test_cells_find_the_nearest_seeds():
+    """Against brute force over all periodic copies of the seeds."""
+    near, second, value = cells(np.random.default_rng(2), 64, 5, 0.9)
+    rng = np.random.default_rng(2)
+    seeds = 0.5 + 0.9 * (rng.random((5, 5, 2)) - 0.5) + np.stack(np.meshgrid(range(5), range(5)), -1)
+    values = rng.random((5, 5), dtype=np.float32)
+    t = (np.arange(64) + 0.5) / 64 * 5
+    points = np.stack(np.meshgrid(t, t), -1)
+    gap = points[:, :, None] - seeds.reshape(-1, 2)
+    distance = np.linalg.norm((gap + 2.5) % 5 - 2.5, axis=-1)
+    order = np.sort(distance, axis=-1)
+    np.testing.assert_allclose(near, order[..., 0], atol=1e-5)
+    np.testing.assert_allclose(second, order[..., 1], atol=1e-5)
+    np.testing.assert_array_equal(value, values.ravel()[distance.argmin(-1)])
+
+
+def test_warp_by_whole_texels_is_a_roll():
+    field = np.random.default_rng(3).random((64, 64)).astype(np.float32)
+    np.testing.assert_allclose(warp(field, 5 / 64, -3 / 64), np.roll(field, (3, -5), axis=(0, 1)), atol=1e-5)
+
+
+def test_stacked_polygons_wrap_and_cover():
+    square = np.array([(-0.25, -0.25), (0.25, -0.25), (0.25, 0.25), (-0.25, 0.25)])
+    above = square * 0.5 + 0.5
+    field = shade(stack(64, [square, above]), np.array([0.4, 0.8]), ground=0.1)
+    corners = field[[0, 0, -1, -1], [0, -1, 0, -1]]
+    np.testing.assert_allclose(corners, 0.4)
+    assert field[32, 32] == pytest.approx(0.8)
+    assert field[32, 0] == pytest.approx(0.1)

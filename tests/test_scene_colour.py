@@ -1,0 +1,57 @@
+"""Colour laws: CIELAB against an independent implementation, Planck's locus, palette models."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from skimage.color import lab2rgb
+
+from fsid.scene.colour import PALETTES, albedo_rgb, blackbody_rgb, lab_rand, lab_to_rgb, related_rand
+
+
+def test_lab_agrees_with_skimage():
+    lab = np.array([(l, a, b) for l in (20, 50, 80) for a in (-20, 0, 20) for b in (-20, 0, 20)], float)  # noqa: E741
+    linear = lab_to_rgb(lab)
+    encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * np.abs(linear) ** (1 / 2.4) - 0.055)
+    inside = np.all((linear > 0) & (linear < 1), axis=1)
+    assert inside.sum() > 15
+    np.testing.assert_allclose(encoded[inside], lab2rgb(lab[inside]), atol=2e-3)
+
+
+def test_white_and_mid_grey():
+    np.testing.assert_allclose(lab_to_rgb(np.array([100.0, 0, 0])), 1, atol=1e-3)
+    np.testing.assert_allclose(lab_to_rgb(np.array([50.0, 0, 0])), 0.1842, atol=1e-3)
+
+
+def test_black_bodies_run_from_red_to_blue_through_white():
+    ratio = [blackbody_rgb(t)[0] / blackbody_rgb(t)[2] for t in (2000, 3000, 4500, 6500, 9000)]
+    assert ratio == sorted(ratio, reverse=True)
+    np.testing.assert_allclose(blackbody_rgb(6500), 1, atol=0.06)
+    assert np.all(blackbody_rgb(1800) >= 0)
+
+
+@given(st.floats(1000, 40000))
+def test_a_black_body_has_luminance_one(temperature):
+    assert blackbody_rgb(temperature) @ (0.2126, 0.7152, 0.0722) == pytest.approx(1)
+
+
+@given(st.integers(0, 2**32), st.sampled_from(PALETTES), st.floats(0, 360))
+def test_palettes_give_albedos_within_the_limits(seed, palette, hue):
+    rng = np.random.default_rng(seed)
+    lab = lab_rand(rng, palette, hue)
+    for colour in (lab, related_rand(rng, lab)):
+        assert np.all(albedo_rgb(colour, 0.02, 0.9) >= 0.02)
+        assert np.all(albedo_rgb(colour, 0.02, 0.9) <= 0.9)
+
+
+def test_palettes_differ_in_how_colourful_they_are():
+    rng = np.random.default_rng(0)
+    chroma = {p: np.mean([np.hypot(*lab_rand(rng, p, 40.0)[1:]) for _ in range(400)]) for p in PALETTES}
+    assert chroma["grey"] < 5 < chroma["natural"] < 20 < chroma["lab"]
+
+
+def test_the_harmonised_palette_keeps_to_its_hue():
+    rng = np.random.default_rng(0)
+    lab = np.array([lab_rand(rng, "harmonised", 200.0) for _ in range(400)])
+    away = (np.degrees(np.arctan2(lab[:, 2], lab[:, 1])) - 200 + 180) % 360 - 180
+    assert np.abs(away).mean() < 20

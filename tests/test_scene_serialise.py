@@ -1,0 +1,71 @@
+"""scene_from_json(scene_to_json(s)) == s exactly, and nothing else is accepted."""
+
+import json
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fsid.errors import FsidError
+from fsid.scene import VARIANTS, SceneConfig, sample, scene_from_json, scene_to_json
+
+FEW = SceneConfig(objects=(2, 4))
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 2**63), st.sampled_from(VARIANTS))
+def test_round_trip_is_exact(seed, variant):
+    scene = sample(FEW, seed, width=64, height=48, variant=variant)
+    text = scene_to_json(scene)
+    assert scene_from_json(text) == scene
+    assert scene_to_json(scene_from_json(text)) == text
+
+
+@pytest.fixture
+def data():
+    return json.loads(scene_to_json(sample(FEW, 7, width=64, height=48)))
+
+
+def test_an_unknown_key_is_named(data):
+    data["lights"][1]["colou"] = 1
+    with pytest.raises(FsidError, match=r"unknown key scene\.lights\[1\]\.colou"):
+        scene_from_json(json.dumps(data))
+
+
+def test_a_missing_key_is_named(data):
+    del data["cameras"][0]["fov_deg"]
+    with pytest.raises(FsidError, match=r"missing key scene\.cameras\[0\]\.fov_deg"):
+        scene_from_json(json.dumps(data))
+
+
+@pytest.mark.parametrize("value", ["12", None, [1.0, 2.0], [1.0, 2.0, "x"], [1.0, 2.0, float("nan")], True])
+def test_a_value_of_the_wrong_kind_is_named(data, value):
+    data["transforms"][0]["position_m"] = value
+    with pytest.raises(FsidError, match=r"scene\.transforms\[0\]\.position_m"):
+        scene_from_json(json.dumps(data))
+
+
+@pytest.mark.parametrize("value", [1.5, "1", True])
+def test_a_whole_number_stays_one(data, value):
+    data["seed"] = value
+    with pytest.raises(FsidError, match=r"scene\.seed"):
+        scene_from_json(json.dumps(data))
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "3"])
+def test_other_text_is_refused_in_one_line(text):
+    with pytest.raises(FsidError, match="scene") as caught:
+        scene_from_json(text)
+    assert "\n" not in str(caught.value)
+
+
+def test_lists_that_do_not_belong_together_are_refused(data):
+    del data["transforms"][-1]
+    with pytest.raises(FsidError, match=r"scene\.transforms must be as long as"):
+        scene_from_json(json.dumps(data))
+
+
+def test_a_room_has_all_its_surfaces(data):
+    data["background"]["materials"]["flor"] = data["background"]["materials"].pop("floor")
+    with pytest.raises(FsidError, match=r"background\.materials must be one material for each of floor"):
+        scene_from_json(json.dumps(data))
