@@ -1,6 +1,7 @@
 """The camera: clean light to the RAW file that a named camera would have stored, and back to a picture."""
 
 from fsid.sensor.bare import read_mosaic
+from fsid.sensor.calibrate import NoiseFit, TemporalStatistics, fit_noise
 from fsid.sensor.colour import camera_to_srgb_matrix, colour_rand, srgb_to_camera_matrix
 from fsid.sensor.demosaic import demosaic
 from fsid.sensor.develop import develop, develop_linear
@@ -9,7 +10,7 @@ from fsid.sensor.exposure import expose, exposure_rand
 from fsid.sensor.mosaic import bayer_crop, bayer_flip, mosaic, pack, unpack
 from fsid.sensor.noise import add_noise, level_rand, variance
 from fsid.sensor.pairs import clean_from_frame, clean_from_linear, clean_from_photo, noisy_from_clean
-from fsid.sensor.profiles import CameraProfile, load_profile, profile_names
+from fsid.sensor.profiles import CameraProfile, load_profile, profile_names, save_profile
 from fsid.sensor.quantise import clean_levels, from_dn, quantise, to_dn
 from fsid.sensor.raw import CFA_PATTERNS, NoiseLevel, Raw
 from fsid.sensor.tone import srgb_decode, srgb_encode
@@ -18,8 +19,10 @@ from fsid.sensor.unprocess import linear_to_camera, process, unprocess
 __all__ = [
     "CFA_PATTERNS",
     "CameraProfile",
+    "NoiseFit",
     "NoiseLevel",
     "Raw",
+    "TemporalStatistics",
     "add_noise",
     "bayer_crop",
     "bayer_flip",
@@ -35,6 +38,7 @@ __all__ = [
     "dng_pixel_offset",
     "expose",
     "exposure_rand",
+    "fit_noise",
     "from_dn",
     "level_rand",
     "linear_to_camera",
@@ -47,6 +51,7 @@ __all__ = [
     "quantise",
     "read_mosaic",
     "read_raw",
+    "save_profile",
     "srgb_decode",
     "srgb_encode",
     "srgb_to_camera_matrix",

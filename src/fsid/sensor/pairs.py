@@ -9,10 +9,10 @@ caller gives. The clean image is neither rounded nor noisy.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fsid.render.frame import Frame
 from fsid.sensor.colour import colour_rand
 from fsid.sensor.exposure import expose
 from fsid.sensor.mosaic import mosaic
@@ -21,6 +21,9 @@ from fsid.sensor.profiles import CameraProfile
 from fsid.sensor.quantise import quantise
 from fsid.sensor.raw import NoiseLevel, Raw
 from fsid.sensor.unprocess import check_srgb, linear_to_camera, unprocess
+
+if TYPE_CHECKING:  # RAW files are read and developed on machines without a graphics library
+    from fsid.render.frame import Frame
 
 PHOTO_EXPOSURE_MEAN = 0.8  # Brooks et al. 2019: brightness gain is 1 / N(0.8, 0.1)
 PHOTO_EXPOSURE_SIGMA = 0.1

@@ -89,6 +89,35 @@ def load_profile(name_or_path: str | Path) -> CameraProfile:
     return _parse(text, str(name_or_path))
 
 
+def save_profile(path: str | Path, profile: CameraProfile) -> None:
+    """Write `profile` as the YAML that `load_profile` reads (whole or not at all), numbers to 6 digits."""
+    levels = [
+        {
+            "iso": iso,
+            "k": _rounded(k),
+            "sigma2": _rounded(sigma2),
+            "k_dn": _rounded(k * profile.span),
+            "sigma2_dn": _rounded(sigma2 * profile.span**2),
+        }
+        for iso, k, sigma2 in zip(profile.iso, profile.k, profile.sigma2, strict=True)
+    ]
+    keys = ("name", "camera", "cfa", "bits", "black_level", "white_level", "source", "notes")
+    data = {key: getattr(profile, key) for key in keys}
+    data |= {"xyz_to_camera": profile.xyz_to_camera.tolist(), "levels": levels}
+    path = Path(path)
+    part = path.with_name(path.name + ".part")
+    try:
+        part.write_text(yaml.safe_dump(data, sort_keys=False, default_flow_style=None, width=110))
+        part.replace(path)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise FsidError(f"{path}: cannot write this profile: {error.strerror}") from error
+
+
+def _rounded(values: np.ndarray) -> list[float]:
+    return [float(f"{value:.6g}") for value in values]
+
+
 def _read(path: Path) -> str:
     if not path.is_file():
         names = ", ".join(profile_names())

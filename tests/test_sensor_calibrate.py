@@ -1,0 +1,130 @@
+"""Calibration finds the noise that was put in, and the figures of the EMVA 1288 reference sets."""
+
+from collections import defaultdict
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from fsid.errors import FsidError
+from fsid.sensor import (
+    Raw,
+    TemporalStatistics,
+    fit_noise,
+    load_profile,
+    noisy_from_clean,
+    profile_names,
+    save_profile,
+    to_dn,
+)
+
+PROFILE = load_profile("pixel6")
+ROUNDING_DN2 = 1 / 12
+
+
+def _gradient(side: int = 160) -> Raw:
+    ramp = np.linspace(0, 0.9, side, dtype=np.float32)
+    mosaic = np.broadcast_to(ramp, (side, side))
+    return Raw(mosaic, PROFILE.cfa, 64, 1023, (2.0, 1.0, 1.6), PROFILE.xyz_to_camera[0])
+
+
+def _burst(clean, iso, frames, rng, flicker_dn=0.0):
+    level = PROFILE.level(iso)
+    stats = TemporalStatistics(white_level=1023)
+    for _ in range(frames):
+        dn = to_dn(noisy_from_clean(rng, clean, iso, level)).astype(np.int64)
+        stats.add(dn + int(rng.integers(-flicker_dn, flicker_dn + 1)))
+    return stats
+
+
+@pytest.mark.parametrize("iso", [800, 3200, 6400])
+@pytest.mark.parametrize("flicker_dn", [0, 3])
+def test_the_line_of_a_simulated_burst_is_found_within_its_error(iso, flicker_dn):
+    stats = _burst(_gradient(), iso, 50, np.random.default_rng(iso), flicker_dn)
+    fit = fit_noise([stats], cfa=PROFILE.cfa, white_level=1023, black_level=64)
+    level = PROFILE.level(iso)
+    k_dn = np.array(level.k) * PROFILE.span
+    sigma2_dn = np.array(level.sigma2) * PROFILE.span**2 + ROUNDING_DN2
+    np.testing.assert_allclose(fit.k_dn, k_dn, rtol=0.02)
+    assert np.all(np.abs(fit.k_dn - k_dn) < 4.5 * fit.k_dn_error)
+    assert np.all(np.abs(fit.sigma2_dn - sigma2_dn) < 4.5 * fit.sigma2_dn_error)
+
+
+def test_dark_frames_give_black_and_read_noise():
+    rng = np.random.default_rng(0)
+    dark_scene = Raw(np.zeros((160, 160), np.float32), PROFILE.cfa, 64, 1023, (1, 1, 1), np.eye(3))
+    dark = _burst(dark_scene, 3200, 50, rng)
+    fit = fit_noise([_burst(_gradient(), 3200, 20, rng)], cfa=PROFILE.cfa, white_level=1023, dark=dark)
+    sigma2_dn = np.array(PROFILE.level(3200).sigma2) * PROFILE.span**2 + ROUNDING_DN2
+    np.testing.assert_allclose(fit.black, 64, atol=0.05)
+    np.testing.assert_allclose(fit.sigma2_dn, sigma2_dn, rtol=0.03)
+
+
+def test_defective_and_clipped_pixels_do_not_count():
+    rng = np.random.default_rng(1)
+    stats = TemporalStatistics(white_level=1023)
+    clean, level = _gradient(), PROFILE.level(3200)
+    for frame in range(30):
+        dn = to_dn(noisy_from_clean(rng, clean, 3200, level))
+        dn[::20, ::7] = 300 + 200 * (frame % 2)  # telegraph noise
+        dn[5, :] = 0
+        stats.add(dn)
+    fit = fit_noise([stats], cfa=PROFILE.cfa, white_level=1023, black_level=64)
+    np.testing.assert_allclose(fit.k_dn, np.array(level.k) * PROFILE.span, rtol=0.03)
+
+
+@pytest.mark.parametrize(("name", "k", "dark_std"), [("001", 0.28006, 3.0731), ("003", 0.09786, 3.0130)])
+def test_emva_reference_sets(shared_data, name, k, dark_std):
+    folder = shared_data / "emva1288" / name / "images"
+    if not folder.is_dir():
+        pytest.skip(f"{folder}: no EMVA 1288 reference set here")
+    groups = defaultdict(lambda: TemporalStatistics(white_level=4095))
+    for path in sorted(folder.glob("[bd]_[0-9]*.png")):
+        groups["dark" if path.name[0] == "d" and "_000_" in path.name else path.name[:5]].add(
+            np.asarray(Image.open(path))
+        )
+    flats = [stats for key, stats in groups.items() if key[0] == "b" and stats.frames > 1]
+    dark = next(stats for key, stats in sorted(groups.items()) if key[0] == "d" and stats.frames > 1)
+    fit = fit_noise(flats, cfa=None, white_level=4095, dark=dark)
+    assert fit.k_dn[0] == pytest.approx(k, rel=0.01)
+    assert np.sqrt(fit.sigma2_dn[0]) == pytest.approx(dark_std, rel=0.03)
+
+
+@pytest.mark.parametrize("name", profile_names())
+def test_a_profile_survives_its_file(tmp_path, name):
+    profile = load_profile(name)
+    save_profile(tmp_path / "copy.yaml", profile)
+    copy = load_profile(tmp_path / "copy.yaml")
+    for iso in (100, 1000, 6400):
+        np.testing.assert_allclose(copy.level(iso).k, profile.level(iso).k, rtol=1e-5)
+        np.testing.assert_allclose(copy.level(iso).sigma2, profile.level(iso).sigma2, rtol=1e-5)
+    np.testing.assert_array_equal(copy.xyz_to_camera, profile.xyz_to_camera)
+    assert (copy.source, copy.notes, copy.cfa) == (profile.source, profile.notes, profile.cfa)
+    assert [p.name for p in tmp_path.iterdir()] == ["copy.yaml"]
+
+
+def _frames(*images):
+    stats = TemporalStatistics(white_level=1023)
+    for image in images:
+        stats.add(image)
+    return stats
+
+
+@pytest.mark.parametrize(
+    ("bursts", "black", "words"),
+    [
+        ([_frames(np.full((4, 4), 100))], 64, "two frames"),
+        ([TemporalStatistics(1023)], 64, "two frames"),
+        ([_frames(np.full((40, 40), 100), np.full((40, 40), 101))], 64, "light levels"),
+        ([_frames(np.full((40, 40), 1023), np.full((40, 40), 1023))], 64, "light levels"),
+        ([_frames(np.full((4, 4), 100), np.full((4, 4), 100))], None, "dark frames or the black"),
+    ],
+)
+def test_a_burst_that_says_nothing_is_refused(bursts, black, words):
+    with pytest.raises(FsidError, match=words):
+        fit_noise(bursts, cfa="RGGB", white_level=1023, black_level=black)
+
+
+def test_frames_of_different_size_are_refused():
+    with pytest.raises(FsidError, match=r"\(4, 6\)"):
+        _frames(np.zeros((4, 4)), np.zeros((4, 6)))
