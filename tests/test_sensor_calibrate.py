@@ -125,6 +125,14 @@ def test_a_burst_that_says_nothing_is_refused(bursts, black, words):
         fit_noise(bursts, cfa="RGGB", white_level=1023, black_level=black)
 
 
+def test_dark_frames_that_are_clipped_are_refused():
+    dark = _frames(np.zeros((40, 40), np.uint16), np.zeros((40, 40), np.uint16))
+    with pytest.raises(FsidError, match="dark frames"):
+        fit_noise(
+            [_burst(_gradient(), 3200, 2, np.random.default_rng(0))], cfa=None, white_level=1023, dark=dark
+        )
+
+
 def test_frames_of_different_size_are_refused():
     with pytest.raises(FsidError, match=r"\(4, 6\)"):
         _frames(np.zeros((4, 4)), np.zeros((4, 6)))

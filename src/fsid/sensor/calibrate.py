@@ -100,6 +100,8 @@ def fit_noise(
     samples = [group.sites(cfa) for group in groups]
     fits = []
     for of_site in zip(*samples, strict=True):
+        if dark is not None and of_site[-1][0].size == 0:
+            raise FsidError("the dark frames are clipped everywhere; check that the lens was covered")
         if dark is not None:
             black_level = float(of_site[-1][0].mean())
         if black_level is None:
