@@ -1,0 +1,16 @@
+"""fsid doctor: what this machine has."""
+
+from __future__ import annotations
+
+from rich.console import Console
+from rich.table import Table
+
+
+def doctor() -> None:
+    """Print what was found (OpenGL, GPU, libraries) and render one frame; exit code 2 where that fails."""
+    from fsid.evaluate.doctor import examine
+
+    table = Table(show_header=False, box=None)
+    for name, finding in examine():
+        table.add_row(f"[bold]{name}[/bold]", finding)
+    Console().print(table)

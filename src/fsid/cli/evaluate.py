@@ -1,0 +1,41 @@
+"""fsid evaluate: how good denoisers are, per light level."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+from tyro.conf import Positional, UseAppendAction
+
+from fsid.cli.arguments import OptionalOutput
+from fsid.cli.progress import progress_bar
+
+
+def evaluate(
+    testset: Positional[Path],
+    *,
+    model: UseAppendAction[tuple[Path, ...]] = (),
+    output: OptionalOutput = None,
+    quiet: bool = False,
+) -> None:
+    """Measure the noisy input, a classical denoiser and models: RAW PSNR, and PSNR and SSIM after develop.
+
+    Prints one table per set. With -o, writes results.json and report.html (tables, plot, crops).
+
+    Args:
+        testset: Folder made by fsid testset.
+        model: Folder of a training, or a model file; may be given several times.
+        output: Folder of the results.
+        quiet: No progress bar.
+    """
+    from fsid.evaluate.models import evaluate_models
+
+    with progress_bar("measuring", "captures", quiet=quiet) as progress:
+        comparison = evaluate_models(testset, model, output, progress=progress)
+    for name in dict.fromkeys(row.set for row in comparison.rows):
+        table = Table("model", *comparison.testset.levels, title=f"{name}: PSNR raw / PSNR / SSIM")
+        for method in dict.fromkeys(row.model for row in comparison.rows):
+            rows = [row for row in comparison.rows if (row.set, row.model) == (name, method)]
+            table.add_row(method, *(f"{r.psnr_raw:.2f} / {r.psnr:.2f} / {r.ssim:.3f}" for r in rows))
+        Console().print(table)

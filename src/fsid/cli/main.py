@@ -1,0 +1,71 @@
+"""`fsid COMMAND ...`: finds the command, and turns bad input into one line and exit code 2."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from typing import NoReturn
+
+import tyro
+from rich.console import Console
+from rich.text import Text
+
+from fsid.cli import (
+    demo,
+    denoise,
+    develop,
+    doctor,
+    evaluate,
+    generate,
+    preview,
+    profiles,
+    scene,
+    testset,
+    train,
+)
+from fsid.errors import FsidError
+
+COMMANDS: dict[str, Callable[..., None]] = {
+    "generate": generate.generate,
+    "preview": preview.preview,
+    "scene": scene.scene,
+    "profiles": profiles.profiles,
+    "train": train.train,
+    "denoise": denoise.denoise,
+    "develop": develop.develop,
+    "testset": testset.testset,
+    "evaluate": evaluate.evaluate,
+    "demo": demo.demo,
+    "doctor": doctor.doctor,
+}
+
+DESCRIPTION = "RAW denoisers trained on nothing but rendered scenes: generate pairs, train, denoise, prove."
+EXTRAS = {"torch": "train", "accelerate": "train", "safetensors": "train"}
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run one command; exit code 0 when done, 2 when the input was bad."""
+    try:
+        tyro.extras.subcommand_cli_from_dict(
+            COMMANDS,
+            prog="fsid",
+            description=DESCRIPTION,
+            args=arguments,
+            config=(tyro.conf.FlagCreatePairsOff,),
+        )
+    except FsidError as error:
+        _fail(str(error))
+    except ModuleNotFoundError as error:
+        if error.name not in EXTRAS:
+            raise
+        _fail(
+            f"this command needs {error.name}, which is not installed: pip install 'fsid[{EXTRAS[error.name]}]'"
+        )
+    except KeyboardInterrupt:
+        Console(stderr=True).print("fsid: interrupted; run the same command again to continue")
+        sys.exit(130)
+
+
+def _fail(line: str) -> NoReturn:
+    Console(stderr=True).print(Text(f"fsid: {line}", style="bold red"), soft_wrap=True)
+    sys.exit(2)

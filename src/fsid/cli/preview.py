@@ -1,0 +1,44 @@
+"""fsid preview: a contact sheet of scenes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tyro.conf import Positional
+
+from fsid.cli.generate import Variant
+from fsid.cli.progress import progress_bar
+from fsid.config import load_settings
+
+
+def preview(
+    output: Positional[Path],
+    *,
+    count: int = 12,
+    seed: int = 0,
+    config: Path | None = None,
+    set: tuple[str, ...] = (),
+    width: int = 480,
+    height: int = 270,
+    variant: Variant = "full",
+    quiet: bool = False,
+) -> None:
+    """Render scenes 0 .. COUNT-1 of a seed into one picture, without noise: what a dataset would hold.
+
+    Args:
+        output: PNG file to write.
+        count: Number of scenes.
+        seed: Seed of the dataset.
+        config: YAML file of settings, as for fsid generate.
+        set: Single settings, key=value.
+        width: Width of one scene in pixels.
+        height: Height of one scene in pixels.
+        variant: What varies between scenes.
+        quiet: No progress bar.
+    """
+    from fsid.dataset import GenerateConfig, contact_sheet, save_png
+
+    overrides = [*set, f"width={width}", f"height={height}", f"variant={variant}"]
+    settings = load_settings(GenerateConfig, config, overrides)
+    with progress_bar("scenes", "scenes", quiet=quiet) as progress:
+        save_png(output, contact_sheet(settings, seed, count, progress=progress))

@@ -1,0 +1,41 @@
+"""fsid profiles: the built-in camera noise profiles."""
+
+from __future__ import annotations
+
+from rich.console import Console
+from rich.table import Table
+from tyro.conf import Positional
+
+
+def profiles(name: Positional[str | None] = None) -> None:
+    """List the built-in camera noise profiles, or show one: k and sigma2 per ISO and CFA site.
+
+    Args:
+        name: A built-in profile or a YAML file. All built-in profiles are listed where it is left out.
+    """
+    from fsid.sensor import load_profile, profile_names
+
+    console = Console()
+    if name is None:
+        table = Table("name", "camera", "CFA", "black", "white", "ISO")
+        for known in profile_names():
+            profile = load_profile(known)
+            levels = (profile.cfa, str(profile.black_level), str(profile.white_level))
+            table.add_row(known, profile.camera, *levels, f"{min(profile.iso):g} .. {max(profile.iso):g}")
+        console.print(table)
+        return
+    profile = load_profile(name)
+    console.print(
+        f"[bold]{profile.camera}[/bold]  CFA {profile.cfa}, DN {profile.black_level}..{profile.white_level}"
+    )
+    console.print(
+        "Var(x) = k x + sigma2, x = (DN - black) / (white - black), as used (mean of the four CFA sites)"
+    )
+    table = Table("ISO", "k", "sigma2", "read noise (DN)")
+    span = profile.white_level - profile.black_level
+    for iso in profile.iso:
+        level = profile.level(iso)
+        k, sigma2 = sum(level.k) / 4, sum(level.sigma2) / 4
+        table.add_row(f"{iso:g}", f"{k:.3e}", f"{sigma2:.3e}", f"{sigma2**0.5 * span:.2f}")
+    console.print(table)
+    console.print(profile.source)

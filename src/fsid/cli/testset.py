@@ -1,0 +1,41 @@
+"""fsid testset: truths and their noisy captures, to measure denoisers on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+from tyro.conf import Positional
+
+from fsid.cli.arguments import Output
+from fsid.cli.progress import progress_bar
+
+
+def testset(
+    source: Positional[Literal["photos"]],
+    folders: Positional[tuple[Path, ...]],
+    *,
+    output: Output,
+    camera: str = "pixel6",
+    iso: tuple[int, ...] = (800, 1600, 3200, 6400),
+    seed: int = 0,
+    quiet: bool = False,
+) -> None:
+    """Make a RAW test set: a truth per image, and one noisy capture per light level.
+
+    Args:
+        source: "photos": photographs are unprocessed to RAW and given a camera's noise.
+        folders: Folders of photographs; the name of a folder becomes the name of its set.
+        output: Folder of the test set.
+        camera: Noise profile, a built-in name (fsid profiles) or a file.
+        iso: ISO of each light level.
+        seed: Seed of white balance, colour matrix and noise.
+        quiet: No progress bar.
+    """
+    from fsid.errors import FsidError
+    from fsid.evaluate import photo_testset
+
+    if not folders:
+        raise FsidError("fsid testset photos: name at least one folder of photographs")
+    with progress_bar("photographs", "photographs", quiet=quiet) as progress:
+        photo_testset(folders, output, camera=camera, isos=iso, seed=seed, progress=progress)

@@ -1,0 +1,30 @@
+"""Samples, shards on disk, and training patches from them."""
+
+from fsid.dataset.config import GenerateConfig
+from fsid.dataset.generate import DatasetConfig, generate
+from fsid.dataset.photos import find_photos, read_photo
+from fsid.dataset.picture import contact_sheet, grid, save_png
+from fsid.dataset.sample import Sample, encode, make_sample, sample_key, scene_of, to_uint8
+from fsid.dataset.shards import find_shards, read_member, shard_keys, shard_path, write_shard
+
+__all__ = [
+    "DatasetConfig",
+    "GenerateConfig",
+    "Sample",
+    "contact_sheet",
+    "encode",
+    "find_photos",
+    "find_shards",
+    "generate",
+    "grid",
+    "make_sample",
+    "read_member",
+    "read_photo",
+    "sample_key",
+    "save_png",
+    "scene_of",
+    "shard_keys",
+    "shard_path",
+    "to_uint8",
+    "write_shard",
+]

@@ -1,0 +1,44 @@
+"""Photographs as the source of clean images, for the real rival and for test sets."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, ImageOps
+
+from fsid.errors import FsidError
+
+PHOTO_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".bmp")
+
+
+def find_photos(folder: Path) -> list[Path]:
+    """The photographs directly inside `folder`, sorted by name; FsidError where there is none."""
+    if not folder.is_dir():
+        raise FsidError(f"{folder}: is not a folder of photographs")
+    photos = sorted(path for path in folder.iterdir() if path.suffix.lower() in PHOTO_SUFFIXES)
+    if not photos:
+        raise FsidError(f"{folder}: holds no photograph ({', '.join(PHOTO_SUFFIXES)})")
+    return photos
+
+
+def read_photo(path: Path) -> np.ndarray:
+    """(H, W, 3) float32 sRGB-encoded 0..1, upright, cropped to even size; FsidError where unreadable."""
+    try:
+        with Image.open(path) as image:
+            upright = ImageOps.exif_transpose(image).convert("RGB")
+            pixels = np.asarray(upright, np.float32) / np.float32(255.0)
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+        raise FsidError(f"{path}: cannot be read as a photograph ({error})") from None
+    height, width = (size // 2 * 2 for size in pixels.shape[:2])
+    if min(height, width) < 32:
+        raise FsidError(f"{path}: is {pixels.shape[1]}x{pixels.shape[0]} pixels, at least 32x32 are needed")
+    return pixels[:height, :width]
+
+
+def crop_rand(rng: np.random.Generator, pixels: np.ndarray, height: int, width: int) -> np.ndarray:
+    """A random (height, width) window of (H, W, 3) `pixels`, or as much of it as the photograph has."""
+    height, width = min(height, pixels.shape[0]), min(width, pixels.shape[1])
+    top = int(rng.integers(pixels.shape[0] - height + 1))
+    left = int(rng.integers(pixels.shape[1] - width + 1))
+    return pixels[top : top + height, left : left + width]

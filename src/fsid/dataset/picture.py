@@ -1,0 +1,62 @@
+"""Pictures for people: PNG files and contact sheets of scenes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from fsid.dataset.config import GenerateConfig
+from fsid.dataset.sample import make_sample, to_uint8
+from fsid.errors import FsidError
+from fsid.render import Renderer
+from fsid.sensor import develop
+
+GAP_PX = 4
+
+
+def save_png(path: Path, srgb: np.ndarray) -> None:
+    """Write a (H, W, 3) sRGB image, 0..1 float or uint8, as PNG; FsidError where it cannot be written."""
+    if path.suffix.lower() != ".png":
+        raise FsidError(f"{path}: pictures are written as .png")
+    pixels = srgb if srgb.dtype == np.uint8 else to_uint8(srgb)
+    try:
+        Image.fromarray(pixels).save(path)
+    except OSError as error:
+        path.unlink(missing_ok=True)
+        raise FsidError(f"{path}: cannot be written ({error.strerror})") from None
+
+
+def contact_sheet(
+    config: GenerateConfig,
+    seed: int,
+    count: int,
+    *,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> np.ndarray:
+    """The clean images of samples 0 .. count-1, developed, in a grid: (H, W, 3) uint8 sRGB."""
+    if count < 1:
+        raise FsidError(f"--count {count}: at least one scene is needed")
+    tiles = []
+    with Renderer(supersampling=config.supersampling, texture_size=config.texture_size) as renderer:
+        for i in range(count):
+            progress(i, count)
+            tiles.append(to_uint8(develop(make_sample(config, seed, i, renderer).clean)))
+        progress(count, count)
+    return grid(tiles)
+
+
+def grid(tiles: list[np.ndarray]) -> np.ndarray:
+    """Equally sized (h, w, 3) uint8 tiles side by side, about as many columns as rows, on white."""
+    columns = int(np.ceil(np.sqrt(len(tiles))))
+    rows = int(np.ceil(len(tiles) / columns))
+    height, width = tiles[0].shape[:2]
+    sheet = np.full(
+        (rows * (height + GAP_PX) - GAP_PX, columns * (width + GAP_PX) - GAP_PX, 3), 255, np.uint8
+    )
+    for i, tile in enumerate(tiles):
+        top, left = (i // columns) * (height + GAP_PX), (i % columns) * (width + GAP_PX)
+        sheet[top : top + height, left : left + width] = tile
+    return sheet

@@ -1,0 +1,84 @@
+"""Shards: WebDataset tar files that appear whole or not at all.
+
+A shard is written under a hidden name and renamed when it is complete, so what exists is finished and what
+is missing is the remaining work: there is no other bookkeeping. All tar metadata is constant (time 0,
+owner 0), so equal samples give equal shards.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import tarfile
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+from fsid.errors import FsidError
+
+
+def shard_path(folder: Path, number: int) -> Path:
+    """Path of shard `number`."""
+    return folder / f"shard-{number:05d}.tar"
+
+
+def find_shards(folder: Path) -> list[Path]:
+    """The finished shards of a dataset, in order; FsidError where there is none."""
+    if not folder.is_dir():
+        raise FsidError(f"{folder}: is not a dataset folder (fsid generate makes one)")
+    shards = sorted(folder.glob("shard-*.tar"))
+    if not shards:
+        raise FsidError(f"{folder}: holds no shard-*.tar (fsid generate makes them)")
+    return shards
+
+
+def write_shard(path: Path, samples: Iterable[tuple[str, Mapping[str, bytes]]]) -> None:
+    """Write (key, {extension: bytes}) samples as one tar, atomically. FsidError where the disk refuses."""
+    part = path.with_name(f".{path.name}.part")
+    with _disk_refusals(path):
+        try:
+            with tarfile.open(part, "w", format=tarfile.USTAR_FORMAT) as tar:
+                for key, files in samples:
+                    for extension, data in files.items():
+                        member = tarfile.TarInfo(f"{key}.{extension}")
+                        member.size = len(data)
+                        member.mode = 0o644
+                        tar.addfile(member, io.BytesIO(data))
+            os.replace(part, path)
+        finally:
+            part.unlink(missing_ok=True)
+
+
+def shard_keys(path: Path) -> list[str]:
+    """The keys of the samples inside a shard, in order. FsidError where it is not a readable tar."""
+    return list(dict.fromkeys(name.partition(".")[0] for name in _members(path)))
+
+
+def read_member(path: Path, name: str) -> bytes:
+    """One file of a shard, for example `00000000.json`."""
+    try:
+        with tarfile.open(path, "r:") as tar:
+            file = tar.extractfile(name)
+            if file is None:
+                raise KeyError(name)
+            return file.read()
+    except (OSError, tarfile.TarError, KeyError):
+        raise FsidError(f"{path}: has no readable member {name}") from None
+
+
+def _members(path: Path) -> list[str]:
+    try:
+        with tarfile.open(path, "r:") as tar:
+            return tar.getnames()
+    except (OSError, tarfile.TarError) as error:
+        raise FsidError(f"{path}: is not a readable shard ({error}); delete it and generate again") from None
+
+
+@contextmanager
+def _disk_refusals(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise FsidError(
+            f"{path}: cannot be written ({error.strerror}); nothing half-written is left"
+        ) from None

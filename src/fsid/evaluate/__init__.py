@@ -1,0 +1,26 @@
+"""Metrics, test sets, comparisons and the report.
+
+`models` and `demo` need PyTorch and are imported by name; the rest runs without it.
+"""
+
+from fsid.evaluate.classical import denoise_classical
+from fsid.evaluate.compare import CLASSICAL, NOISY, Comparison, Method, Row, compare, write_results
+from fsid.evaluate.metrics import psnr, ssim
+from fsid.evaluate.testset import TestImage, TestSet, photo_testset, read_testset
+
+__all__ = [
+    "CLASSICAL",
+    "NOISY",
+    "Comparison",
+    "Method",
+    "Row",
+    "TestImage",
+    "TestSet",
+    "compare",
+    "denoise_classical",
+    "photo_testset",
+    "psnr",
+    "read_testset",
+    "ssim",
+    "write_results",
+]

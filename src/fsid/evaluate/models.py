@@ -1,0 +1,45 @@
+"""Evaluate trained models on a test set: `fsid evaluate`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from fsid.denoise import denoise_raw, load_model
+from fsid.errors import FsidError
+from fsid.evaluate.compare import CLASSICAL, NOISY, Comparison, Method, compare, write_results
+from fsid.evaluate.report import comparison_sections, write_report
+from fsid.evaluate.testset import read_testset
+
+
+def model_method(path: Path, name: str | None = None) -> Method:
+    """A trained model as a method; `name` defaults to the name of its folder or file."""
+    model = load_model(path)
+    return Method(name or path.resolve().stem, model.card.training, lambda raw: denoise_raw(raw, model))
+
+
+def evaluate_models(
+    testset: Path,
+    models: Sequence[Path],
+    out: Path | None,
+    *,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> Comparison:
+    """Compare the baselines and `models`; writes results.json and report.html into `out` unless None."""
+    levels = read_testset(testset).levels
+    methods = [NOISY, CLASSICAL, *(model_method(path) for path in models)]
+    if out is not None:
+        _make(out)
+    comparison = compare(testset, methods, crop_levels=levels[len(levels) // 2 :][:1], progress=progress)
+    if out is not None:
+        write_results(comparison.rows, out / "results.json")
+        lead = f"{len(comparison.testset.images)} images, {len(levels)} levels. {comparison.testset.notes}."
+        write_report(out / "report.html", f"FSID: {testset.name}", lead, comparison_sections(comparison))
+    return comparison
+
+
+def _make(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FsidError(f"{folder}: cannot be written ({error.strerror})") from None

@@ -1,0 +1,115 @@
+"""Test sets: a truth and its noisy captures, per image and light level, as DNG files.
+
+    DIR/testset.json                      camera, levels and the list of images
+    DIR/<image>/clean.dng                 the truth
+    DIR/<image>/<level>.noisy.dng         what the camera saw, for example iso3200.noisy.dng
+
+A level is a name such as "iso3200"; the noise level of each capture is in its DNG `NoiseProfile`.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from fsid.config import from_plain, to_plain
+from fsid.dataset import find_photos, read_photo
+from fsid.errors import FsidError
+from fsid.sensor import clean_from_photo, clean_levels, load_profile, noisy_from_clean, write_dng
+
+
+@dataclass(frozen=True)
+class TestImage:
+    """One truth. `set` names where it is from; `name` is its folder inside the test set."""
+
+    __test__ = False
+
+    name: str
+    set: str
+
+
+@dataclass(frozen=True)
+class TestSet:
+    """The content of testset.json. iso: per level, in the order of `levels`."""
+
+    __test__ = False
+
+    camera: str
+    levels: tuple[str, ...]
+    images: tuple[TestImage, ...]
+    seed: int
+    notes: str
+
+    def clean(self, root: Path, image: TestImage) -> Path:
+        """Path of the truth of `image`."""
+        return root / image.name / "clean.dng"
+
+    def noisy(self, root: Path, image: TestImage, level: str) -> Path:
+        """Path of the capture of `image` at `level`."""
+        return root / image.name / f"{level}.noisy.dng"
+
+
+def read_testset(root: Path) -> TestSet:
+    """The description of the test set in `root`; FsidError where it is missing or broken."""
+    file = root / "testset.json"
+    try:
+        plain = json.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise FsidError(f"{file}: cannot be read ({error.strerror}); fsid testset makes one") from None
+    except ValueError as error:
+        raise FsidError(f"{file}: is not valid JSON ({error})") from None
+    testset = from_plain(TestSet, plain, source=str(file))
+    names = [*testset.levels, *(image.name for image in testset.images)]
+    for name in names:
+        if not name or name != Path(name).name:
+            raise FsidError(f"{file}: {name!r} is not a plain file name")
+    return testset
+
+
+def photo_testset(
+    folders: Sequence[Path],
+    out: Path,
+    *,
+    camera: str,
+    isos: Sequence[int],
+    seed: int = 0,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> TestSet:
+    """Push photographs through a named camera: unprocess, mosaic, and one capture per ISO.
+
+    The set of an image is the name of its folder. Photograph i draws from SeedSequence(seed, spawn_key=(i,)).
+    """
+    profile = load_profile(camera)
+    if not isos or min(isos) <= 0:
+        raise FsidError("--iso: at least one positive ISO is needed")
+    if (out / "testset.json").exists():
+        raise FsidError(f"{out}: already holds a test set; use another folder")
+    photos = [(folder.name, path) for folder in folders for path in find_photos(folder)]
+    images = []
+    for i, (set_name, path) in enumerate(photos):
+        rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(i,)))
+        image = TestImage(f"{i:04d}-{path.stem}", set_name)
+        clean = clean_from_photo(rng, read_photo(path), profile)
+        try:
+            (out / image.name).mkdir(parents=True, exist_ok=True)
+            write_dng(out / image.name / "clean.dng", clean_levels(clean))
+            for iso in isos:
+                noisy = noisy_from_clean(rng, clean, iso, profile.level(iso))
+                write_dng(out / image.name / f"iso{iso}.noisy.dng", noisy)
+        except OSError as error:
+            raise FsidError(f"{out}: cannot be written ({error.strerror})") from None
+        images.append(image)
+        progress(i + 1, len(photos))
+    testset = TestSet(
+        camera=profile.name,
+        levels=tuple(f"iso{iso}" for iso in isos),
+        images=tuple(images),
+        seed=seed,
+        notes="photographs unprocessed to RAW (Brooks et al. 2019), noise from the camera's profile",
+    )
+    (out / "testset.json").write_text(json.dumps(to_plain(testset), indent=1) + "\n", encoding="utf-8")
+    return testset

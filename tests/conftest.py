@@ -1,0 +1,39 @@
+"""Shared by the tests: small data made on the spot, and the optional folder of real data."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+REPOSITORY = Path(__file__).resolve().parents[1]
+
+
+@pytest.fixture(scope="session")
+def photos(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with three small photographs, cut from one that scikit-image ships."""
+    from skimage import data
+
+    folder = tmp_path_factory.mktemp("photos")
+    coffee = data.coffee()
+    for i, (top, left) in enumerate([(0, 0), (100, 200), (200, 300)]):
+        Image.fromarray(coffee[top : top + 160, left : left + 200]).save(folder / f"coffee-{i}.png")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """The optional folder of real data (FSID_SHARED_DATA, or ../shared/data); skips where it is absent."""
+    folder = Path(os.environ.get("FSID_SHARED_DATA", REPOSITORY.parent / "shared" / "data"))
+    if not folder.is_dir():
+        pytest.skip(f"{folder}: no shared data here; set FSID_SHARED_DATA")
+    return folder
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    """A generator with a fixed seed."""
+    return np.random.default_rng(20261121)

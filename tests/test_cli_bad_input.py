@@ -1,0 +1,97 @@
+"""Bad input to any command: one line that names it, exit code 2, nothing half-written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from fsid.cli.main import COMMANDS, main
+
+
+def refused(capsys: pytest.CaptureFixture[str], *arguments: str | Path) -> str:
+    """The line that a refused command prints."""
+    with pytest.raises(SystemExit) as stop:
+        main([str(argument) for argument in arguments])
+    assert stop.value.code == 2
+    line = capsys.readouterr().err.strip()
+    assert line.startswith("fsid: ")
+    assert "\n" not in line
+    assert "Traceback" not in line
+    return line
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with files that are not what their names say."""
+    (tmp_path / "text.dng").write_text("not a RAW")
+    (tmp_path / "text.yaml").write_text("a: [")
+    (tmp_path / "wrong.yaml").write_text("no_such_key: 1")
+    (tmp_path / "text.safetensors").write_text("not weights")
+    (tmp_path / "empty").mkdir()
+    np.save(tmp_path / "nan.npy", np.full((64, 64), np.nan, np.float32))
+    Image.new("L", (64, 64)).save(tmp_path / "gray8.png")
+    return tmp_path
+
+
+CASES = [
+    ("generate {0}/out --count 0", "--count"),
+    ("generate {0}/out --count 1 --width 33", "width"),
+    ("generate {0}/out --count 1 --set no_such_key=1", "no_such_key"),
+    ("generate {0}/out --count 1 --set cameras=[nokia]", "nokia"),
+    ("generate {0}/out --count 1 --config {0}/none.yaml", "none.yaml"),
+    ("generate {0}/out --count 1 --config {0}/text.yaml", "text.yaml"),
+    ("generate {0}/out --count 1 --config {0}/wrong.yaml", "no_such_key"),
+    ("generate {0}/out --count 1 --images {0}/empty", "empty"),
+    ("generate {0}/text.dng/out --count 1", "text.dng"),
+    ("preview {0}/out.jpg --count 1", "out.jpg"),
+    ("preview {0}/out.png --count 0", "--count"),
+    ("scene 1 -o {0}/scene.txt", "scene.txt"),
+    ("scene 1 -o {0}/none/scene.json", "scene.json"),
+    ("profiles nokia", "nokia"),
+    ("profiles {0}/text.yaml", "text.yaml"),
+    ("develop {0}/none.dng {0}/out.png", "none.dng"),
+    ("develop {0}/text.dng {0}/out.png", "text.dng"),
+    ("train {0}/none -o {0}/out", "none"),
+    ("train {0}/empty -o {0}/out", "empty"),
+    ("train {0}/empty -o {0}/out --set no_such_key=1", "no_such_key"),
+    ("denoise {0}/none.dng {0}/out.dng --model {0}/none", "none"),
+    ("denoise {0}/text.dng {0}/out.dng --model {0}/text.safetensors", "text.safetensors"),
+    ("testset photos {0}/empty -o {0}/out", "empty"),
+    ("testset photos {0}/none -o {0}/out", "none"),
+    ("testset photos {0}/empty -o {0}/out --camera nokia", "nokia"),
+    ("evaluate {0}/empty", "testset.json"),
+    ("evaluate {0}/empty --model {0}/none", "empty"),
+    ("demo -o {0}/out --photographs 99", "--photographs"),
+    ("demo -o {0}/out --width 31", "width"),
+]
+
+
+@pytest.mark.parametrize(("command", "named"), CASES)
+def test_bad_input_is_one_line(
+    command: str,
+    named: str,
+    folder: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+):
+    before = sorted(folder.rglob("*"))
+    assert named in refused(capsys, *command.format(folder).split())
+    assert sorted(folder.rglob("*")) == before
+
+
+def test_every_command_is_in_the_list_of_cases():
+    covered = {command.split()[0] for command, _ in CASES}
+    assert covered == set(COMMANDS) - {"doctor"}, "doctor takes no input"
+
+
+@pytest.mark.parametrize("command", [*COMMANDS, ""])
+def test_help_describes_every_option(command: str, capsys: pytest.CaptureFixture[str]):
+    with pytest.raises(SystemExit) as stop:
+        main([*command.split(), "--help"])
+    assert stop.value.code == 0
+    text = capsys.readouterr().out
+    for line in text.splitlines():
+        assert not line.strip("│ ").startswith("(default"), f"an option without a description: {line}"

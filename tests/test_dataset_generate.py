@@ -1,0 +1,132 @@
+"""A dataset is a function of (settings, seed): not of workers, order or interruptions."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rawpy
+import webdataset
+
+from fsid.config import load_settings
+from fsid.dataset import GenerateConfig, generate, read_member, shard_keys, shard_path
+from fsid.errors import FsidError
+
+SMALL = ["width=128", "height=96", "texture_size=128"]
+
+
+def small(*overrides: str) -> GenerateConfig:
+    return load_settings(GenerateConfig, None, [*SMALL, *overrides])
+
+
+def digests(folder: Path) -> dict[str, str]:
+    """Digest of every file of every sample, whatever shard it is in."""
+    return {
+        f"{key}.{extension}": hashlib.sha256(read_member(shard, f"{key}.{extension}")).hexdigest()
+        for shard in sorted(folder.glob("shard-*.tar"))
+        for key in shard_keys(shard)
+        for extension in ("clean.dng", "noisy.dng", "rgb.png", "json")
+    }
+
+
+@pytest.fixture(scope="module")
+def scenes(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("scenes")
+    generate(folder, small(), count=4, seed=7, workers=1, shard_size=2)
+    return folder
+
+
+def test_workers_and_shard_size_do_not_change_a_sample(scenes: Path, tmp_path: Path):
+    generate(tmp_path, small(), count=4, seed=7, workers=2, shard_size=3)
+    assert digests(tmp_path) == digests(scenes)
+    assert len(digests(tmp_path)) == 16
+
+
+def test_a_lost_shard_comes_back_byte_for_byte(scenes: Path):
+    before = [shard.read_bytes() for shard in sorted(scenes.glob("shard-*.tar"))]
+    shard_path(scenes, 1).unlink()
+    assert generate(scenes, small(), count=4, seed=7, shard_size=2) == 2
+    assert [shard.read_bytes() for shard in sorted(scenes.glob("shard-*.tar"))] == before
+    assert generate(scenes, small(), count=4, seed=7, shard_size=2) == 0
+
+
+def test_another_seed_gives_other_pictures(scenes: Path, tmp_path: Path):
+    generate(tmp_path, small(), count=1, seed=8)
+    assert read_member(shard_path(tmp_path, 0), "00000000.rgb.png") != read_member(
+        shard_path(scenes, 0), "00000000.rgb.png"
+    )
+
+
+def test_another_configuration_in_the_same_folder_is_refused(scenes: Path):
+    with pytest.raises(FsidError, match=r"generate\.width \(128 there, 160 here\)"):
+        generate(scenes, small("width=160"), count=4, seed=7, shard_size=2)
+    with pytest.raises(FsidError, match=r"seed \(7 there, 9 here\)"):
+        generate(scenes, small(), count=4, seed=9, shard_size=2)
+
+
+def test_a_pair_opens_in_libraw_and_differs_by_its_stated_noise(scenes: Path):
+    shard = shard_path(scenes, 0)
+    record = json.loads(read_member(shard, "00000000.json"))
+    mosaics = {}
+    for name in ("clean", "noisy"):
+        with rawpy.imread(io.BytesIO(read_member(shard, f"00000000.{name}.dng"))) as raw:
+            black, white = raw.black_level_per_channel[0], raw.white_level
+            mosaics[name] = (raw.raw_image.astype(np.float64) - black) / (white - black)
+    clean, noisy = mosaics["clean"], mosaics["noisy"]
+    assert clean.shape == (96, 128)
+    k, sigma2 = np.mean(record["k"]), np.mean(record["sigma2"])
+    unclipped = clean < 0.5
+    expected = np.mean(k * clean[unclipped] + sigma2)
+    assert np.var((noisy - clean)[unclipped]) == pytest.approx(expected, rel=0.15)
+
+
+def test_webdataset_reads_the_shards(scenes: Path):
+    samples = list(webdataset.WebDataset([str(shard_path(scenes, 0))], shardshuffle=False))
+    assert [sample["__key__"] for sample in samples] == ["00000000", "00000001"]
+    assert {"clean.dng", "noisy.dng", "rgb.png", "json"} <= samples[0].keys()
+
+
+def test_photographs_go_through_the_same_chain(photos: Path, tmp_path: Path):
+    config = small(f"images={photos}")
+    generate(tmp_path / "one", config, count=5, seed=1, workers=1)
+    generate(tmp_path / "two", config, count=5, seed=1, workers=2, shard_size=2)
+    assert digests(tmp_path / "one") == digests(tmp_path / "two")
+    record = json.loads(read_member(shard_path(tmp_path / "one", 0), "00000004.json"))
+    assert record["image"] == "coffee-1.png"
+
+
+@pytest.mark.parametrize(
+    ("override", "named"),
+    [
+        ("width=127", "width"),
+        ("height=0", "height"),
+        ("variant=all", "variant"),
+        ("iso_range=[800, 100]", "iso_range"),
+        ("cameras=[]", "cameras"),
+        ("supersampling=9", "supersampling"),
+        ("texture_size=1000", "texture_size"),
+        ("scene.no_such_key=1", "no_such_key"),
+    ],
+)
+def test_a_bad_setting_is_named(override: str, named: str):
+    with pytest.raises(FsidError, match=named):
+        small(override)
+
+
+def test_an_unknown_camera_is_named_before_anything_is_written(tmp_path: Path):
+    with pytest.raises(FsidError, match="nokia3310"):
+        generate(tmp_path / "out", small("cameras=[nokia3310]"), count=1)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_broken_photograph_is_named_and_leaves_no_shard(tmp_path: Path):
+    folder = tmp_path / "photos"
+    folder.mkdir()
+    (folder / "broken.png").write_bytes(b"\x89PNG\r\n\x1a\n but not really")
+    with pytest.raises(FsidError, match=r"broken\.png"):
+        generate(tmp_path / "out", small(f"images={folder}"), count=1)
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["config.yaml"]

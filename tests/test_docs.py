@@ -1,0 +1,71 @@
+"""The guides' commands run, in the order in which a reader meets them."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import shutil
+import tarfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fsid.cli.main import COMMANDS, main
+from fsid.sensor import read_raw, to_dn
+
+REPOSITORY = Path(__file__).resolve().parents[1]
+GUIDES = ("noise-profiles.md", "generate.md", "train-and-denoise.md", "evaluate.md")
+
+
+def commands(guide: str) -> list[str]:
+    text = (REPOSITORY / "docs" / guide).read_text(encoding="utf-8")
+    return [line for block in re.findall(r"```sh\n(.*?)```", text, re.S) for line in block.splitlines()]
+
+
+@pytest.fixture(scope="module")
+def desk(tmp_path_factory: pytest.TempPathFactory, photos: Path) -> Path:
+    """A folder with what the guides take as given: photographs."""
+    folder = tmp_path_factory.mktemp("desk")
+    shutil.copytree(photos, folder / "photographs")
+    return folder
+
+
+def take_inputs_of_denoise(desk: Path) -> None:
+    with tarfile.open(desk / "data" / "shard-00000.tar") as tar:
+        member = tar.extractfile("00000000.noisy.dng")
+        assert member is not None
+        (desk / "noisy.dng").write_bytes(member.read())
+    np.save(desk / "mosaic.npy", to_dn(read_raw(desk / "noisy.dng")))
+
+
+@pytest.mark.parametrize("guide", GUIDES)
+def test_the_commands_of_a_guide_run(guide: str, desk: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(desk)
+    if guide == "train-and-denoise.md":
+        take_inputs_of_denoise(desk)
+    lines = commands(guide)
+    assert lines
+    for line in lines:
+        program, *arguments = shlex.split(line)
+        assert program == "fsid"
+        main(arguments)
+
+
+def test_what_the_guides_promise_is_there(desk: Path):
+    """Runs after the guides: pytest keeps the order of a file."""
+    assert (desk / "scenes.png").exists()
+    assert (desk / "denoised.png").exists()
+    assert (desk / "results" / "report.html").exists()
+    denoised, noisy = read_raw(desk / "denoised.dng"), read_raw(desk / "noisy.dng")
+    assert denoised.mosaic.shape == noisy.mosaic.shape
+    assert denoised.cfa == noisy.cfa
+    assert denoised.iso == pytest.approx(noisy.iso)
+    assert denoised.white_balance == pytest.approx(noisy.white_balance, rel=1e-4)
+    assert read_raw(desk / "mosaic.dng").cfa == "GBRG"
+
+
+def test_the_readme_names_every_command_and_no_other():
+    text = (REPOSITORY / "README.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"^\| `fsid ([a-z]+)", text, re.M))
+    assert named == set(COMMANDS)

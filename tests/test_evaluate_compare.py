@@ -1,0 +1,132 @@
+"""Test sets and comparisons: what is written is read, and the figures are those of the files."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rawpy
+
+from fsid.errors import FsidError
+from fsid.evaluate import CLASSICAL, NOISY, Method, compare, photo_testset, psnr, read_testset, write_results
+from fsid.evaluate.report import comparison_sections, write_report
+from fsid.sensor import read_raw
+
+
+@pytest.fixture(scope="module")
+def small_set(photos: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = tmp_path_factory.mktemp("sets") / "testset"
+    photo_testset([photos], root, camera="pixel6", isos=[800, 3200], seed=3)
+    return root
+
+
+def test_a_test_set_is_dng_files_with_their_noise_level(small_set: Path):
+    testset = read_testset(small_set)
+    assert testset.levels == ("iso800", "iso3200")
+    assert len(testset.images) == 3
+    with rawpy.imread(str(testset.noisy(small_set, testset.images[0], "iso3200"))) as raw:
+        assert raw.other.iso_speed == 3200
+    truth, noisy = (
+        read_raw(small_set / testset.images[0].name / name) for name in ("clean.dng", "iso3200.noisy.dng")
+    )
+    assert noisy.noise is not None
+    error = (noisy.mosaic - truth.mosaic)[truth.mosaic < 0.5]
+    expected = np.mean(noisy.noise.k) * truth.mosaic[truth.mosaic < 0.5].mean() + np.mean(noisy.noise.sigma2)
+    assert error.var() == pytest.approx(expected, rel=0.1)
+
+
+def test_the_same_seed_gives_the_same_files(small_set: Path, photos: Path, tmp_path: Path):
+    photo_testset([photos], tmp_path / "again", camera="pixel6", isos=[800, 3200], seed=3)
+    for file in sorted(path for path in small_set.rglob("*") if path.is_file()):
+        assert file.read_bytes() == (tmp_path / "again" / file.relative_to(small_set)).read_bytes()
+
+
+def test_rows_are_means_over_the_files(small_set: Path, tmp_path: Path):
+    testset = read_testset(small_set)
+    comparison = compare(small_set, [NOISY, CLASSICAL], crop_levels=["iso3200"], crop_px=64)
+    rows = {(row.model, row.level): row for row in comparison.rows}
+    expected = np.mean(
+        [
+            psnr(
+                read_raw(testset.noisy(small_set, image, "iso800")).mosaic,
+                read_raw(testset.clean(small_set, image)).mosaic,
+            )
+            for image in testset.images
+        ]
+    )
+    assert rows["noisy", "iso800"].psnr_raw == pytest.approx(expected)
+    assert rows["noisy", "iso800"].n == 3
+    assert rows["classical", "iso3200"].psnr_raw > rows["noisy", "iso3200"].psnr_raw
+    assert {crops.truth.shape for crops in comparison.crops} == {(64, 64, 3)}
+
+    write_results(comparison.rows, tmp_path / "results.json")
+    written = json.loads((tmp_path / "results.json").read_text())
+    assert set(written[0]) == {"model", "training", "camera", "level", "set", "n", "psnr_raw", "psnr", "ssim"}
+    assert [row["camera"] for row in written] == ["pixel6"] * 4
+
+
+def test_the_truth_scores_perfectly(small_set: Path):
+    testset = read_testset(small_set)
+    truths = iter(testset.images)
+    perfect = Method(
+        "perfect",
+        "",
+        lambda raw: dataclasses.replace(raw, mosaic=read_raw(testset.clean(small_set, next(truths))).mosaic),
+    )
+    one_level = dataclasses.replace(testset, levels=("iso800",))
+    (small_set / "testset.json").write_text(json.dumps(dataclasses.asdict(one_level)))
+    try:
+        (row,) = compare(small_set, [perfect]).rows
+    finally:
+        (small_set / "testset.json").write_text(json.dumps(dataclasses.asdict(testset)))
+    assert row.psnr_raw == float("inf")
+    assert row.ssim == pytest.approx(1.0)
+
+
+def test_the_report_is_one_file_that_loads_nothing(small_set: Path, tmp_path: Path):
+    class Links(HTMLParser):
+        def __init__(self) -> None:
+            super().__init__()
+            self.sources: list[str] = []
+
+        def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+            self.sources += [value or "" for name, value in attrs if name in ("src", "href")]
+
+    comparison = compare(small_set, [NOISY, CLASSICAL], crop_levels=["iso800"], crop_px=64)
+    write_report(tmp_path / "r.html", "<script>", "lead", comparison_sections(comparison))
+    page = (tmp_path / "r.html").read_text()
+    links = Links()
+    links.feed(page)
+    assert links.sources
+    assert all(source.startswith("data:image/png;base64,") for source in links.sources)
+    assert "<script>" not in page
+    noisy = next(row for row in comparison.rows if (row.model, row.level) == ("noisy", "iso800"))
+    assert f"{noisy.psnr_raw:.2f}" in page
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("{", "not valid JSON"),
+        ('{"camera": "x"}', "testset"),
+        (
+            '{"camera": "x", "levels": ["iso1"], "images": [{"name": "../../etc", "set": "s"}], '
+            '"seed": 0, "notes": ""}',
+            "plain file name",
+        ),
+    ],
+)
+def test_a_broken_test_set_is_named(tmp_path: Path, text: str, named: str):
+    (tmp_path / "testset.json").write_text(text)
+    with pytest.raises(FsidError, match=named):
+        read_testset(tmp_path)
+
+
+def test_a_missing_capture_is_named(small_set: Path, tmp_path: Path):
+    (tmp_path / "testset.json").write_text((small_set / "testset.json").read_text())
+    with pytest.raises(FsidError, match=r"clean\.dng"):
+        compare(tmp_path, [NOISY])

@@ -1,0 +1,70 @@
+"""The figures mean what their names say."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from skimage import data
+
+from fsid.evaluate import denoise_classical, psnr, ssim
+from fsid.evaluate.classical import _anscombe, _unbiased_inverse
+from fsid.sensor import NoiseLevel, add_noise, clean_from_photo, load_profile, variance
+
+
+def test_psnr_of_a_known_error(rng: np.random.Generator):
+    truth = rng.uniform(0.2, 0.8, (64, 64))
+    assert psnr(truth + 0.1, truth) == pytest.approx(20.0)
+    assert psnr(truth, truth) == float("inf")
+
+
+def test_values_outside_the_range_count_as_clipped():
+    assert psnr(np.full((8, 8), -3.0), np.zeros((8, 8))) == float("inf")
+
+
+def test_ssim_is_one_for_equal_images_and_falls_with_noise(rng: np.random.Generator):
+    truth = data.coffee()[:64, :64] / 255.0
+    weak, strong = (np.clip(truth + s * rng.standard_normal(truth.shape), 0, 1) for s in (0.02, 0.1))
+    assert ssim(truth, truth) == pytest.approx(1.0)
+    assert 1.0 > ssim(weak, truth) > ssim(strong, truth) > 0.0
+
+
+def test_the_transform_makes_the_variance_one(rng: np.random.Generator):
+    for counts, sigma in ((5.0, 1.0), (50.0, 2.0), (500.0, 10.0)):
+        noisy = rng.poisson(counts, 200_000) + sigma * rng.standard_normal(200_000)
+        assert np.var(_anscombe(noisy, np.array(sigma**2))) == pytest.approx(1.0, abs=0.05)
+
+
+def test_the_inverse_is_unbiased(rng: np.random.Generator):
+    for counts, sigma in ((0.0, 3.0), (2.0, 1.0), (20.0, 2.0), (300.0, 5.0)):
+        noisy = rng.poisson(counts, 400_000) + sigma * rng.standard_normal(400_000)
+        mean = np.mean(_anscombe(noisy, np.array(sigma**2)))
+        assert _unbiased_inverse(mean, np.array(sigma**2)) == pytest.approx(counts, abs=0.1, rel=0.01)
+
+
+def test_the_classical_denoiser_removes_noise_and_keeps_the_mean(rng: np.random.Generator):
+    profile = load_profile("pixel6")
+    clean = clean_from_photo(rng, data.coffee()[:128, :128].astype(np.float32) / 255, profile)
+    noisy = add_noise(rng, clean, profile.level(3200))
+    denoised = denoise_classical(noisy)
+    assert psnr(denoised.mosaic, clean.mosaic) > psnr(noisy.mosaic, clean.mosaic) + 3
+    assert denoised.mosaic.mean() == pytest.approx(clean.mosaic.mean(), rel=0.02)
+    assert denoised.cfa == noisy.cfa
+    assert denoised.noise is None
+
+
+def test_the_simulated_noise_has_the_stated_psnr(rng: np.random.Generator):
+    profile = load_profile("pixel6")
+    level = profile.level(1600)
+    clean = clean_from_photo(rng, data.coffee()[:256, :256].astype(np.float32) / 255, profile)
+    clean = dataclasses.replace(clean, mosaic=np.clip(clean.mosaic, 0.2, 0.6))
+    expected = -10 * np.log10(variance(clean.mosaic, level, clean.cfa).mean())
+    assert psnr(add_noise(rng, clean, level).mosaic, clean.mosaic) == pytest.approx(expected, abs=0.1)
+
+
+def test_without_a_noise_level_the_classical_denoiser_says_so(rng: np.random.Generator):
+    clean = clean_from_photo(rng, data.coffee()[:64, :64].astype(np.float32) / 255, load_profile("pixel6"))
+    with pytest.raises(Exception, match="noise level is unknown"):
+        denoise_classical(dataclasses.replace(clean, noise=None))
+    denoise_classical(clean, NoiseLevel((1e-3,) * 4, (1e-5,) * 4))
