@@ -1,10 +1,10 @@
 """Train a denoiser on a dataset of clean mosaics; noise is drawn afresh for every patch.
 
-    minimise  mean over patches of  log( mean (net(noisy) - clean)^2 + eps )        AdamW, warm-up + cosine,
-    EMA
+    minimise  mean (stabilise(net(noisy)) - stabilise(clean))^2            AdamW, warm-up + cosine, EMA
 
-The loss is minus the PSNR of each patch (NAFNet's loss, Chen et al. 2022, section 4): a logarithm per patch
-gives dark and bright, quiet and noisy patches equal weight, which a plain mean over ISO 400..8000 would not.
+The error is measured in the stabilised domain, where the noise has unit variance: the loss is the share of
+the noise that is left, 1 for the untrained network. So dark and bright, quiet and noisy patches count alike;
+a plain mean of squares over ISO 400..8000 would hear the brightest and noisiest alone.
 
 **Resume.** Batch `step` depends on (seed, step) and everything else that a step needs is in one checkpoint
 file: weights, their moving average, both moments of AdamW, the loss history. It is replaced atomically, so a
@@ -31,12 +31,12 @@ from fsid.denoise.checkpoint import TrainState, load_checkpoint, save_checkpoint
 from fsid.denoise.live import LiveLine
 from fsid.denoise.model import MODEL_FILE, ModelCard, save_model, write_atomically
 from fsid.denoise.raw_denoiser import RawDenoiser
+from fsid.denoise.stabilise import stabilise
 from fsid.denoise.train_config import TrainConfig
 from fsid.errors import FsidError
 
 CONFIG_FILE = "config.yaml"
 HISTORY_FILE = "history.json"
-_LOSS_FLOOR = 1e-8  # a patch restored better than 80 dB counts no further
 
 
 def train(
@@ -108,10 +108,15 @@ def learning_rate(config: TrainConfig, step: int) -> float:
     return float(config.learning_rate * (config.final_rate + (1 - config.final_rate) * cosine))
 
 
-def psnr_loss(estimate: Tensor, clean: Tensor) -> tuple[Tensor, Tensor]:
-    """(loss, PSNR in dB with data range 1), both means over the patches of (B, 4, h, w)."""
-    error = (estimate - clean).square().mean((1, 2, 3))
-    return torch.log(error + _LOSS_FLOOR).mean(), -10 * torch.log10(error.detach() + _LOSS_FLOOR).mean()
+def noise_left(estimate: Tensor, clean: Tensor, k: Tensor, sigma2: Tensor) -> Tensor:
+    """Mean squared error of (B, 4, h, w) in units of the noise variance; k, sigma2 (B, 4)."""
+    k, sigma2 = k[:, :, None, None], sigma2[:, :, None, None]
+    return (stabilise(estimate, k, sigma2) - stabilise(clean, k, sigma2)).square().mean()
+
+
+def mean_psnr(estimate: Tensor, clean: Tensor) -> Tensor:
+    """Mean over the patches of (B, 4, h, w) of their PSNR in dB, data range 1, linear RAW."""
+    return -10 * torch.log10((estimate - clean).square().mean((1, 2, 3)) + 1e-12).mean()
 
 
 def _prepare_run(run_dir: Path, config: TrainConfig, resume: bool) -> None:
@@ -166,14 +171,15 @@ def _step(
     for group in optimizer.param_groups:
         group["lr"] = rate
     optimizer.zero_grad()
-    loss, psnr = psnr_loss(net(noisy, k, sigma2), clean)
+    estimate = net(noisy, k, sigma2).float()
+    loss = noise_left(estimate, clean, k, sigma2)
     accelerator.backward(loss)
     accelerator.clip_grad_norm_(net.parameters(), config.clip_norm)
     optimizer.step()
     value = loss.item()
     if not np.isfinite(value):
         raise FsidError("the loss is not finite: the training diverged; lower learning_rate and start again")
-    return value, psnr.item()
+    return value, mean_psnr(estimate.detach(), clean).item()
 
 
 def _save(run_dir: Path, state: TrainState, net: torch.nn.Module, optimizer: torch.optim.Optimizer) -> None:
