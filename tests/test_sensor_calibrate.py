@@ -19,7 +19,6 @@ from fsid.sensor import (
 )
 
 PROFILE = load_profile("pixel6")
-ROUNDING_DN2 = 1 / 12
 
 
 def _gradient(side: int = 160) -> Raw:
@@ -44,7 +43,7 @@ def test_the_line_of_a_simulated_burst_is_found_within_its_error(iso, flicker_dn
     fit = fit_noise([stats], cfa=PROFILE.cfa, white_level=1023, black_level=64)
     level = PROFILE.level(iso)
     k_dn = np.array(level.k) * PROFILE.span
-    sigma2_dn = np.array(level.sigma2) * PROFILE.span**2 + ROUNDING_DN2
+    sigma2_dn = np.array(level.sigma2) * PROFILE.span**2
     np.testing.assert_allclose(fit.k_dn, k_dn, rtol=0.02)
     assert np.all(np.abs(fit.k_dn - k_dn) < 4.5 * fit.k_dn_error)
     assert np.all(np.abs(fit.sigma2_dn - sigma2_dn) < 4.5 * fit.sigma2_dn_error)
@@ -55,7 +54,7 @@ def test_dark_frames_give_black_and_read_noise():
     dark_scene = Raw(np.zeros((160, 160), np.float32), PROFILE.cfa, 64, 1023, (1, 1, 1), np.eye(3))
     dark = _burst(dark_scene, 3200, 50, rng)
     fit = fit_noise([_burst(_gradient(), 3200, 20, rng)], cfa=PROFILE.cfa, white_level=1023, dark=dark)
-    sigma2_dn = np.array(PROFILE.level(3200).sigma2) * PROFILE.span**2 + ROUNDING_DN2
+    sigma2_dn = np.array(PROFILE.level(3200).sigma2) * PROFILE.span**2
     np.testing.assert_allclose(fit.black, 64, atol=0.05)
     np.testing.assert_allclose(fit.sigma2_dn, sigma2_dn, rtol=0.03)
 

@@ -90,14 +90,16 @@ def test_quantise_rounds_to_dn_clips_at_white_and_keeps_what_is_below_black():
     np.testing.assert_allclose(quantise(raw).mosaic[0], [-64 / 959, -10 / 959, 480 / 959, 1.0], rtol=1e-6)
 
 
-def test_rounding_adds_a_twelfth_of_a_squared_dn():
+@pytest.mark.parametrize(("iso", "x"), [(3200, 0.2), (800, 0.0)])
+def test_the_variance_of_stored_data_is_that_of_its_level(iso, x):
+    """Rounding is a part of sigma2 and not added to it; at ISO 800 in the dark it would be a tenth more."""
     profile = load_profile("pixel6")
-    level = profile.level(3200)
-    noisy = noisy_from_clean(np.random.default_rng(0), _flat(0.2, profile.cfa), 3200, level)
+    level = profile.level(iso)
+    noisy = noisy_from_clean(np.random.default_rng(0), _flat(x, profile.cfa), iso, level)
     sites = pack(noisy.mosaic, profile.cfa).reshape(4, -1).astype(np.float64)
-    expected = np.array(level.k) * 0.2 + np.array(level.sigma2) + 1 / 12 / profile.span**2
+    expected = np.array(level.k) * x + np.array(level.sigma2)
     np.testing.assert_allclose(sites.var(axis=1), expected, rtol=4.5 * np.sqrt(2 / sites.shape[1]))
-    assert noisy.iso == 3200
+    assert noisy.iso == iso
     assert noisy.noise == level
 
 

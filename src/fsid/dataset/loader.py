@@ -1,7 +1,7 @@
 """Training patches: a fresh exposure of a random piece of a random clean mosaic, by (seed, step) alone.
 
-    noisy = DN(clean + sqrt(k clean + sigma2) n),    n ~ N(0, 1),    DN: round and clip as the camera's
-    converter does
+    noisy = DN(clean + sqrt(k clean + sigma2 - r) n),    n ~ N(0, 1),    DN: round and clip as the camera's
+    converter does, which adds r = 1/12 DN^2
 
 **Flips.** A packed RAW hides where its four sites lie inside the 2x2 tile. Mirroring the packed planes keeps
 their names but moves R from the left of Gr to its right: edges between planes jump by a pixel, and the
@@ -31,6 +31,7 @@ from fsid.errors import FsidError
 from fsid.sensor.mosaic import site_offsets
 from fsid.sensor.noise import level_rand
 from fsid.sensor.profiles import CameraProfile, load_profile
+from fsid.sensor.quantise import ROUNDING_DN2
 from fsid.sensor.raw import NoiseLevel
 
 
@@ -144,10 +145,11 @@ def _expose(
     sigma2: np.ndarray,
     cameras: list[CameraProfile],
 ) -> np.ndarray:
-    """`quantise(add_noise(...))` of the sensor, for a whole batch of levels and cameras at once."""
+    """`noisy_from_clean(...)` of the sensor, for a whole batch of levels and cameras at once."""
+    rounding = np.array([[ROUNDING_DN2 / camera.span**2] for camera in cameras], np.float32)
     noisy = np.maximum(clean, 0)
     noisy *= k[:, :, None, None]
-    noisy += sigma2[:, :, None, None]
+    noisy += np.maximum(sigma2 - rounding, 0)[:, :, None, None]
     np.sqrt(noisy, out=noisy)
     noisy *= rng.standard_normal(clean.shape, dtype=np.float32)
     noisy += clean

@@ -1,7 +1,7 @@
 """The camera: clean light to the RAW file that a named camera would have stored, and back to a picture."""
 
 from fsid.sensor.bare import read_mosaic
-from fsid.sensor.calibrate import NoiseFit, TemporalStatistics, fit_noise
+from fsid.sensor.calibrate import NoiseFit, fit_noise
 from fsid.sensor.colour import camera_to_srgb_matrix, colour_rand, srgb_to_camera_matrix
 from fsid.sensor.demosaic import demosaic
 from fsid.sensor.develop import develop, develop_linear
@@ -13,6 +13,7 @@ from fsid.sensor.pairs import clean_from_frame, clean_from_linear, clean_from_ph
 from fsid.sensor.profiles import CameraProfile, load_profile, profile_names, save_profile
 from fsid.sensor.quantise import clean_levels, from_dn, quantise, to_dn
 from fsid.sensor.raw import CFA_PATTERNS, NoiseLevel, Raw
+from fsid.sensor.temporal import TemporalStatistics
 from fsid.sensor.tone import srgb_decode, srgb_encode
 from fsid.sensor.unprocess import linear_to_camera, process, unprocess
 

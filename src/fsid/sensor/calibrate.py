@@ -8,10 +8,9 @@ of the mean of N sample variances from n frames is 2 V^2 / (N (n - 1)). Unweight
 intercept. Dark frames give black level and intercept directly; without them the black level must be known.
 
 Excluded: pixels that touched 0 or white in any frame, means above 70 % of the range (EMVA 1288, 6.6), and
-pixels whose variance no Gaussian noise explains (telegraph noise, something moved). The level of each frame
-is subtracted first, so that a lamp's flicker does not count as noise. sigma2_dn contains the rounding of the
-converter, 1/12 DN^2, as in every published table; read noise below half a DN cannot be told through rounding,
-and its sigma2_dn comes out too small.
+pixels whose variance no Gaussian noise explains (telegraph noise, something moved). sigma2_dn contains the
+rounding of the converter, 1/12 DN^2, as in every published table. That sum holds only where noise spreads
+over several integers: pools below `RESOLVED_DN2` say nothing, and no intercept is below 1/12 DN^2.
 """
 
 from __future__ import annotations
@@ -23,10 +22,13 @@ import numpy as np
 from scipy.stats import chi2
 
 from fsid.errors import FsidError
-from fsid.sensor.mosaic import site_offsets
+from fsid.sensor.quantise import ROUNDING_DN2
+from fsid.sensor.temporal import TemporalStatistics
 
 LINEAR_SHARE = 0.7  # of the range above black; beyond it sensors saturate softly
 OUTLIER_PROBABILITY = 1e-6  # of Gaussian noise to look like a defective pixel
+OUTLIER_SHARE = 0.05  # of the pixels, above which the scene moved: sensors have fewer defects
+RESOLVED_DN2 = 0.33  # Gaussian noise of sigma 0.5 DN, rounded: its variance is true within 1 %
 _POOLS = 256
 _POOL_PIXELS = 200  # wanted in a pool on average
 _MIN_POOL_PIXELS = 50
@@ -34,54 +36,38 @@ _REWEIGHTINGS = 10
 
 
 @dataclass(frozen=True)
+class Samples:
+    """Pooled pixels of one burst and one site.
+
+    signal, variance: (m,) DN above black and DN^2. freedom: (m,) degrees of freedom. used: (m,) bool, False
+    where the fit leaves the pool out (beyond the linear range, or below the resolution of the converter).
+    """
+
+    signal: np.ndarray
+    variance: np.ndarray
+    freedom: np.ndarray
+    used: np.ndarray
+
+    @staticmethod
+    def joined(parts: Sequence[Samples]) -> Samples:
+        """All pools of several bursts or sites."""
+        names = ("signal", "variance", "freedom", "used")
+        return Samples(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+
+
+@dataclass(frozen=True)
 class NoiseFit:
-    """The line in DN, its standard errors, the black level; (4,) each: R, Gr, Gb, B; (1,) without a CFA."""
+    """The line in DN, its standard errors, the black level; (4,) each: R, Gr, Gb, B; (1,) without a CFA.
+
+    samples: what the line was fitted to, one per site.
+    """
 
     k_dn: np.ndarray
     sigma2_dn: np.ndarray
     k_dn_error: np.ndarray
     sigma2_dn_error: np.ndarray
     black: np.ndarray
-
-
-class TemporalStatistics:
-    """Mean and variance over time of every pixel of one burst, from one frame after the other.
-
-    Memory: 19 bytes per pixel, however many frames. Sums count from the first frame, so that they stay small.
-    """
-
-    def __init__(self, white_level: int) -> None:
-        self.frames = 0
-        self._white_level = white_level
-        self._first: np.ndarray | None = None
-
-    def add(self, dn: np.ndarray) -> None:
-        """One more frame, (H, W) integers, of the same size as the others."""
-        if self._first is None:
-            self._first = dn.astype(np.uint16)
-            self._sum, self._squares = np.zeros(dn.shape), np.zeros(dn.shape)
-            self._clipped = np.zeros(dn.shape, bool)
-            self._levels = 0.0
-        if dn.shape != self._first.shape:
-            raise FsidError(f"a frame of the burst is {dn.shape}, the first one {self._first.shape} (H, W)")
-        change = dn - self._first.astype(np.float64)
-        level = change.mean()
-        change -= level
-        self._sum += change
-        self._squares += change**2
-        self._levels += level
-        self._clipped |= (dn <= 0) | (dn >= self._white_level)
-        self.frames += 1
-
-    def sites(self, cfa: str | None) -> list[tuple[np.ndarray, np.ndarray]]:
-        """(mean, variance) in DN of the unclipped pixels of each site; of all pixels if `cfa` is None."""
-        if self._first is None or self.frames < 2:
-            raise FsidError("a burst needs at least two frames: a single one has no variance over time")
-        mean = self._first + (self._sum + self._levels) / self.frames
-        variance = (self._squares - self._sum**2 / self.frames) / (self.frames - 1)
-        places = [np.s_[:, :]] if cfa is None else [np.s_[r::2, c::2] for r, c in site_offsets(cfa)]
-        kept = [~self._clipped[place] for place in places]
-        return [(mean[p][keep], variance[p][keep]) for p, keep in zip(places, kept, strict=True)]
+    samples: tuple[Samples, ...]
 
 
 def fit_noise(
@@ -96,60 +82,92 @@ def fit_noise(
 
     cfa: None for a monochrome sensor. black_level: DN, needed where there are no `dark` frames.
     """
+    if dark is not None:
+        black = black_of(dark, cfa)
+    elif black_level is not None:
+        black = np.full(1 if cfa is None else 4, float(black_level))
+    else:
+        raise FsidError("calibration needs dark frames or the black level in DN")
     groups = [*bursts, *([dark] if dark is not None else [])]
-    samples = [group.sites(cfa) for group in groups]
-    fits = []
-    for of_site in zip(*samples, strict=True):
-        if dark is not None and of_site[-1][0].size == 0:
-            raise FsidError("the dark frames are clipped everywhere; check that the lens was covered")
-        if dark is not None:
-            black_level = float(of_site[-1][0].mean())
-        if black_level is None:
-            raise FsidError("calibration needs dark frames or the black level in DN")
-        points = [
-            _pool(mean, variance, group.frames, black_level, white_level)
-            for (mean, variance), group in zip(of_site, groups, strict=True)
-        ]
-        fits.append((*_line(np.concatenate(points)), black_level))
-    k, sigma2, k_error, sigma2_error, blacks = np.array(fits).T
-    return NoiseFit(k, sigma2, k_error, sigma2_error, blacks)
+    return fit_samples([pool(group, cfa, black, white_level) for group in groups], black)
 
 
-def _pool(mean: np.ndarray, variance: np.ndarray, frames: int, black: float, white: int) -> np.ndarray:
-    """Pixels of like mean as rows (signal above black, mean variance, degrees of freedom)."""
-    limit = LINEAR_SHARE * (white - black)
-    signal = mean - black
-    linear = signal < limit
-    signal, variance = signal[linear], variance[linear]
+def black_of(dark: TemporalStatistics, cfa: str | None) -> np.ndarray:
+    """Mean DN of each site of dark frames."""
+    sites = [mean for mean, _ in dark.sites(cfa)]
+    if min(mean.size for mean in sites) == 0:
+        raise FsidError("the dark frames are clipped everywhere; check that the lens was covered")
+    return np.array([mean.mean() for mean in sites])
+
+
+def pool(
+    burst: TemporalStatistics, cfa: str | None, black: np.ndarray, white_level: int
+) -> tuple[Samples, ...]:
+    """Pixels of like mean, one `Samples` per site; black: DN of each site. FsidError if the scene moved."""
+    return tuple(
+        _pool(mean, variance, burst.frames, float(site_black), white_level)
+        for (mean, variance), site_black in zip(burst.sites(cfa), black, strict=True)
+    )
+
+
+def fit_samples(
+    bursts: Sequence[tuple[Samples, ...]], black: np.ndarray, *, tie_greens: bool = False
+) -> NoiseFit:
+    """The noise line of one ISO from pooled bursts; tie_greens: one line through the samples of Gr and Gb."""
+    sites = [Samples.joined(of_site) for of_site in zip(*bursts, strict=True)]
+    if tie_greens and len(sites) == 4:
+        sites[1] = sites[2] = Samples.joined(sites[1:3])
+    k, sigma2, k_error, sigma2_error = np.array([_line(samples) for samples in sites]).T
+    return NoiseFit(k, sigma2, k_error, sigma2_error, black, tuple(sites))
+
+
+def _pool(mean: np.ndarray, variance: np.ndarray, frames: int, black: float, white: int) -> Samples:
+    signal, span = mean - black, white - black
     if signal.size == 0:
-        return np.empty((0, 3))
+        return Samples(np.empty(0), np.empty(0), np.empty(0), np.empty(0, bool))
     pools = int(np.clip(signal.size // _POOL_PIXELS, 1, _POOLS))
-    pool = np.clip((signal / limit * pools).astype(np.int64), -1, pools - 1) + 1
-    ends = np.cumsum(np.bincount(pool, minlength=pools + 1))
-    middles = (np.concatenate([[0], ends[:-1]]) + ends) // 2  # of each pool in ascending order of variance
-    median = variance[np.lexsort((variance, pool))][np.minimum(middles, len(pool) - 1)]
-    largest = chi2.ppf(1 - OUTLIER_PROBABILITY, frames - 1) / chi2.median(frames - 1)
-    sound = variance <= largest * median[pool]
-    pool, signal, variance = pool[sound], signal[sound], variance[sound]
-    count = np.bincount(pool, minlength=pools + 1)
+    index = np.clip((signal / span * pools).astype(np.int64), -1, pools - 1) + 1
+    sound = _sound(variance, index, pools + 1, frames)
+    index, signal, variance = index[sound], signal[sound], variance[sound]
+    count = np.bincount(index, minlength=pools + 1)
     full = count >= _MIN_POOL_PIXELS
-    means = [np.bincount(pool, values, pools + 1)[full] / count[full] for values in (signal, variance)]
-    return np.stack([*means, count[full] * (frames - 1)], axis=1)
+    signal, variance = (np.bincount(index, v, pools + 1)[full] / count[full] for v in (signal, variance))
+    used = (signal < LINEAR_SHARE * span) & (variance > RESOLVED_DN2)
+    return Samples(signal, variance, count[full] * (frames - 1.0), used)
 
 
-def _line(points: np.ndarray) -> tuple[float, float, float, float]:
-    """k, sigma2 and their standard errors from rows (signal, variance, degrees of freedom)."""
-    if len(points) < 2 or np.ptp(points[:, 0]) <= 0:
+def _sound(variance: np.ndarray, index: np.ndarray, pools: int, frames: int) -> np.ndarray:
+    """(n,) False for pixels that vary more than Gaussian noise of their pool's median variance would."""
+    ends = np.cumsum(np.bincount(index, minlength=pools))
+    middles = (np.concatenate([[0], ends[:-1]]) + ends) // 2  # of each pool in ascending order of variance
+    median = variance[np.lexsort((variance, index))][np.minimum(middles, len(index) - 1)]
+    largest = chi2.ppf(1 - OUTLIER_PROBABILITY, frames - 1) / chi2.median(frames - 1)
+    sound = variance <= largest * np.maximum(median[index], RESOLVED_DN2)
+    if sound.mean() < 1 - OUTLIER_SHARE:
+        raise FsidError(
+            f"{100 * (1 - sound.mean()):.0f} % of the pixels vary more than noise does: the scene or the "
+            f"camera moved during the burst; use a tripod and a static scene"
+        )
+    return sound
+
+
+def _line(samples: Samples) -> tuple[float, float, float, float]:
+    """k, sigma2 and their standard errors; sigma2 is not below the rounding noise."""
+    signal, variance, freedom = (v[samples.used] for v in (samples.signal, samples.variance, samples.freedom))
+    if len(signal) < 2 or np.ptp(signal) <= 0:
         raise FsidError(
             "calibration found fewer than two light levels; add an exposure, a gradient or dark frames"
         )
-    signal, variance, freedom = points.T
     design = np.stack([signal, np.ones_like(signal)], axis=1)
     model = variance
     for _ in range(_REWEIGHTINGS):
         weight = freedom / (2 * np.maximum(model, 1e-3) ** 2)
         normal = design.T @ (design * weight[:, None])
         k, sigma2 = np.linalg.solve(normal, design.T @ (variance * weight))
+        if sigma2 < ROUNDING_DN2:
+            sigma2 = ROUNDING_DN2
+            k = (weight * signal * (variance - sigma2)).sum() / normal[0, 0]
         model = design @ (k, sigma2)
-    k_error, sigma2_error = np.sqrt(np.diag(np.linalg.inv(normal)))
+    scatter = float((weight * (variance - model) ** 2).sum() / max(len(signal) - 2, 1))
+    k_error, sigma2_error = np.sqrt(np.diag(np.linalg.inv(normal)) * max(scatter, 1.0))
     return float(k), float(sigma2), float(k_error), float(sigma2_error)

@@ -3,8 +3,11 @@
     y = x + sqrt(k x + sigma2) n,     n ~ N(0, 1),     so Var(y) = k x + sigma2   per CFA site
 
 x is the clean normalised signal. This is the heteroscedastic Gaussian limit of a Poisson count plus
-Gaussian readout (Foi et al. 2008, eq. 5); the result is what reaches the converter: neither rounded nor
-clipped yet.
+Gaussian readout (Foi et al. 2008, eq. 5); the result is neither rounded nor clipped yet.
+
+A profile's sigma2 is that of stored data, as every calibration measures it, and so contains the 1/12 DN^2
+that rounding adds. `before_converter` takes that part out; an image that is rounded afterwards then has the
+variance of its level, and the level that a file states is the variance of the file.
 """
 
 from __future__ import annotations
@@ -16,6 +19,7 @@ import numpy as np
 from fsid.errors import FsidError
 from fsid.sensor.mosaic import site_offsets
 from fsid.sensor.profiles import CameraProfile
+from fsid.sensor.quantise import ROUNDING_DN2
 from fsid.sensor.raw import NoiseLevel, Raw
 
 K_JITTER = 0.05  # relative sigma: conversion gain from unit to unit, and vendors' rounding of ISO
@@ -46,6 +50,13 @@ def add_noise(rng: np.random.Generator, raw: Raw, level: NoiseLevel) -> Raw:
     noise *= sigma
     noise += raw.mosaic
     return replace(raw, mosaic=noise, noise=level)
+
+
+def before_converter(level: NoiseLevel, span: float) -> NoiseLevel:
+    """`level` of stored data without the rounding to 1 / span, span = white - black in DN; sigma2 >= 0."""
+    rounding = ROUNDING_DN2 / span**2
+    r, gr, gb, b = (max(value - rounding, 0.0) for value in level.sigma2)
+    return NoiseLevel(k=level.k, sigma2=(r, gr, gb, b))
 
 
 def level_rand(

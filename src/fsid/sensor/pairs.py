@@ -1,9 +1,10 @@
 """A clean RAW and the noisy one that the camera would have stored.
 
-    frame or photo -> camera RGB in 0..1 -> mosaic = clean,     noisy = Q(clean + sqrt(k clean + sigma2) n)
+    frame or photo -> camera RGB in 0..1 -> mosaic = clean,     noisy = Q(clean + sqrt(k clean + s2) n)
 
-Q rounds and clips like the camera. Colour, exposure and noise are drawn here, from the generator that the
-caller gives. The clean image is neither rounded nor noisy.
+Q rounds and clips like the camera, and s2 is sigma2 without what Q adds: Var(noisy) = k clean + sigma2.
+Colour, exposure and noise are drawn here, from the generator that the caller gives. The clean image is neither
+rounded nor noisy.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import numpy as np
 from fsid.sensor.colour import colour_rand
 from fsid.sensor.exposure import expose
 from fsid.sensor.mosaic import mosaic
-from fsid.sensor.noise import add_noise
+from fsid.sensor.noise import add_noise, before_converter
 from fsid.sensor.profiles import CameraProfile
 from fsid.sensor.quantise import quantise
 from fsid.sensor.raw import NoiseLevel, Raw
@@ -57,7 +58,8 @@ def clean_from_photo(rng: np.random.Generator, srgb: np.ndarray, profile: Camera
 
 def noisy_from_clean(rng: np.random.Generator, clean: Raw, iso: float, level: NoiseLevel) -> Raw:
     """One stored exposure of `clean` at `level`: noise, then the camera's own rounding and clipping."""
-    return replace(quantise(add_noise(rng, clean, level)), iso=iso)
+    span = clean.white_level - clean.black_level
+    return replace(quantise(add_noise(rng, clean, before_converter(level, span))), iso=iso, noise=level)
 
 
 def _raw(

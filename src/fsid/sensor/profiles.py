@@ -24,9 +24,8 @@ from fsid.errors import FsidError
 from fsid.sensor.colour import published_matrices
 from fsid.sensor.iso_law import IsoCurve, k_curve, sigma2_curve
 from fsid.sensor.mosaic import check_cfa
+from fsid.sensor.quantise import ROUNDING_DN2
 from fsid.sensor.raw import NoiseLevel
-
-ROUNDING_VARIANCE_DN2 = 1 / 12  # of the converter: uniform error of one DN width
 
 _REQUIRED = {"name", "camera", "cfa", "bits", "black_level", "white_level", "levels"}
 _OPTIONAL = {"source", "notes", "xyz_to_camera"}
@@ -70,7 +69,7 @@ class CameraProfile:
 
     @cached_property
     def _curves(self) -> tuple[IsoCurve, IsoCurve]:
-        iso, floor = np.array(self.iso), ROUNDING_VARIANCE_DN2 / self.span**2
+        iso, floor = np.array(self.iso), ROUNDING_DN2 / self.span**2
         return k_curve(iso, self.k), sigma2_curve(iso, self.sigma2, floor)
 
 

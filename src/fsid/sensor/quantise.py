@@ -14,6 +14,7 @@ from fsid.errors import FsidError
 from fsid.sensor.raw import Raw
 
 MAX_DN = 65535
+ROUNDING_DN2 = 1 / 12  # variance of a uniform error one DN wide: what rounding adds to noise above half a DN
 
 
 def to_dn(raw: Raw) -> np.ndarray:

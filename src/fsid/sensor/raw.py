@@ -3,7 +3,7 @@
     x = (DN - black) / (white - black),      Var(x) = k * E(x) + sigma2   per CFA site
 
 Values below black stay negative and nothing is clipped here: a mean over clipped noise is biased, and
-the network would learn the bias.
+the network would learn the bias. Var(x) is that of stored data: rounding is a part of sigma2.
 """
 
 from __future__ import annotations

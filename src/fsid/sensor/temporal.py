@@ -1,0 +1,209 @@
+"""Mean and variance over time of every pixel of a burst, from one frame after the other.
+
+    frame_f = gain_f (scene + noise) + offset_f,      change_f = (frame_f - offset_f) / gain_f - frame_0
+
+A lamp flickers and a black level drifts: gain and offset of a frame are those of its 8x8 block means against
+the first frame's, which hardly hold noise. They are used only where they exceed `SIGNIFICANT` standard
+errors, so that a steady burst is left alone and its variance unbiased. A block that still differs afterwards,
+and by enough to count as noise, has moved: it is left out, and where a quarter moved the burst is refused.
+
+Sums count from the first frame, so that they stay small. Memory is 19 bytes per pixel, however many frames.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from fsid.errors import FsidError
+from fsid.sensor.mosaic import site_offsets
+
+SIGNIFICANT = 5.0  # standard errors: of 64 blocks in 1,000 frames none deviates so far by chance
+LARGEST_FLICKER = 0.1  # of the light; beyond it this is another exposure, and its noise another noise
+MOVED_SHARE = 0.25  # of the blocks, from which on the burst shows no static scene
+CONTAMINATION = 0.1  # of a pixel's noise variance, from which on a changed block spoils the fit
+_GRID = 8
+_MIN_BLOCK_SIDE_PX = 8
+_MIN_BLOCKS = 4  # to tell gain from offset
+_MAX_CLIPPED_SHARE = 0.01  # of a block that still tells the light
+_MIN_CONTRAST = 100.0  # variance between blocks over their noise; below it the gain is drowned
+
+
+@dataclass(frozen=True)
+class ReadStatistics:
+    """Parts of the noise of a burst in DN^2: of a pixel, of its rows and of its columns; excess kurtosis.
+
+    level_dn2: variance of the frames' levels, as a drifting black level has it.
+    """
+
+    pixel_dn2: float
+    row_dn2: float
+    column_dn2: float
+    excess_kurtosis: float
+    level_dn2: float
+
+
+class TemporalStatistics:
+    """Statistics of one burst of a static scene; feed it the frames one by one."""
+
+    def __init__(self, white_level: int, *, dark: bool = False) -> None:
+        """white_level: DN. dark: count `read_statistics` too."""
+        self.frames = 0
+        self._dark = dark
+        self.gains: list[float] = []
+        self.offsets_dn: list[float] = []
+        self._white_level = white_level
+        self._first: np.ndarray | None = None
+
+    def add(self, dn: np.ndarray, name: str = "a frame") -> None:
+        """One more frame, (H, W) integers, of the same size as the others; `name` for messages.
+
+        FsidError: another size, the light changed by more than 10 %, or the scene moved.
+        """
+        if self._first is None:
+            self._start(dn)
+        assert self._first is not None
+        if dn.shape != self._first.shape:
+            raise FsidError(f"{name} of the burst is {dn.shape}, the first one {self._first.shape} (H, W)")
+        self._clipped |= (dn <= 0) | (dn >= self._white_level)
+        change = dn - self._first.astype(np.float64)
+        if self.frames:
+            gain, offset = self._match(change, name)
+            if (gain, offset) != (1.0, 0.0):
+                change += self._first * (1 - gain) - offset
+                change /= gain
+            if self._dark:
+                self._count_noise(change)
+            self.gains.append(gain)
+            self.offsets_dn.append(offset)
+        self._sum += change
+        change *= change
+        self._squares += change
+        self.frames += 1
+
+    def mean(self) -> np.ndarray:
+        """(H, W) float64 mean in DN, in the mean light of the burst and not in that of its first frame."""
+        self._check()
+        assert self._first is not None
+        gain, offset = np.mean([1.0, *self.gains]), sum(self.offsets_dn) / self.frames
+        return gain * (self._first + self._sum / self.frames) + offset
+
+    def sites(self, cfa: str | None) -> list[tuple[np.ndarray, np.ndarray]]:
+        """(mean, variance) in DN of the usable pixels of each site; of all pixels if `cfa` is None."""
+        mean = self.mean()
+        places = [np.s_[:, :]] if cfa is None else [np.s_[r::2, c::2] for r, c in site_offsets(cfa)]
+        found = []
+        for place in places:
+            keep = ~self._clipped[place]
+            total, squares = self._sum[place][keep], self._squares[place][keep]
+            found.append((mean[place][keep], (squares - total**2 / self.frames) / (self.frames - 1)))
+        return found
+
+    @property
+    def clipped_share(self) -> float:
+        """Share of the pixels that touched 0 or white, or moved, in any frame."""
+        return float(self._clipped.mean())
+
+    @property
+    def moved_share(self) -> float:
+        """Share of the blocks in which something moved."""
+        return float(self._moved.mean())
+
+    def read_statistics(self) -> ReadStatistics:
+        """What the noise is made of; for bursts of dark frames."""
+        self._check()
+        pixel, fourth, row, column = self._noise / (self.frames - 1)
+        return ReadStatistics(
+            pixel_dn2=pixel / 2,
+            row_dn2=max(row / 2, 0.0),
+            column_dn2=max(column / 2, 0.0),
+            excess_kurtosis=2 * (fourth / pixel**2 - 3) if pixel > 0 else 0.0,
+            level_dn2=float(np.var(self.offsets_dn)) if self.frames > 2 else 0.0,
+        )
+
+    def _check(self) -> None:
+        if self._first is None or self.frames < 2:
+            raise FsidError("a burst needs at least two frames: a single one has no variance over time")
+
+    def _start(self, dn: np.ndarray) -> None:
+        self._first = dn.astype(np.uint16)
+        self._sum, self._squares = np.zeros(dn.shape), np.zeros(dn.shape)
+        self._clipped = np.zeros(dn.shape, bool)
+        self._noise = np.zeros(4)  # sums over frames: d^2, d^4, variance of row means, of column means
+        rows, columns = (max(1, min(_GRID, side // _MIN_BLOCK_SIDE_PX)) for side in dn.shape)
+        self._block = dn.shape[0] // rows, dn.shape[1] // columns
+        self._moved = np.zeros((rows, columns), bool)
+        self._reference = self._blocks(self._first, np.mean)
+
+    def _blocks(self, image: np.ndarray, reduce: Callable[..., np.ndarray]) -> np.ndarray:
+        """(rows, columns) of `reduce` over each block; what does not fill a block is left out."""
+        (height, width), (rows, columns) = self._block, self._moved.shape
+        tiles = image[: height * rows, : width * columns].reshape(rows, height, columns, width)
+        return reduce(tiles, axis=(1, 3))
+
+    def _match(self, change: np.ndarray, name: str) -> tuple[float, float]:
+        """(gain, offset) of a frame against the first one; (1, 0) where neither is significant."""
+        usable = ~self._moved & (self._blocks(self._clipped, np.mean) < _MAX_CLIPPED_SHARE)
+        pixels = self._block[0] * self._block[1]
+        means, noise = self._blocks(change, np.mean), self._blocks(change, np.var)
+        if usable.sum() < _MIN_BLOCKS:
+            return 1.0, 0.0
+        weight = pixels / np.maximum(noise[usable], 1 / 12)
+        gain, offset = _gain_and_offset(means[usable], self._reference[usable], weight)
+        if abs(gain - 1) > LARGEST_FLICKER:
+            raise FsidError(
+                f"{name}: its light differs by {100 * (gain - 1):+.0f} % from the first frame of the burst; "
+                f"use steady light, or leave it out"
+            )
+        left = means - (gain - 1) * self._reference - offset
+        error2 = np.maximum(noise, 1 / 12) / pixels
+        spoils = left**2 > CONTAMINATION * np.maximum(noise, 1 / 12) / 2
+        self._exclude(usable & spoils & (left**2 > SIGNIFICANT**2 * error2), name)
+        return gain, offset
+
+    def _exclude(self, moved: np.ndarray, name: str) -> None:
+        self._moved |= moved
+        if self._moved.mean() >= MOVED_SHARE:
+            raise FsidError(
+                f"{name}: the scene differs from the first frame's in {100 * self._moved.mean():.0f} % of "
+                f"the image; a burst must show a static scene from a tripod, in steady light"
+            )
+        height, width = self._block
+        for row, column in np.argwhere(moved):
+            self._clipped[row * height : (row + 1) * height, column * width : (column + 1) * width] = True
+
+    def _count_noise(self, change: np.ndarray) -> None:
+        height, width = change.shape
+        d = change - change.mean()
+        squares = d * d
+        pixel = float(squares.mean())
+        rows, columns = d.mean(axis=1), d.mean(axis=0)
+        squares *= squares
+        fourth = float(squares.mean())
+        self._noise += (pixel, fourth, rows.var() - pixel / width, columns.var() - pixel / height)
+
+
+def _gain_and_offset(change: np.ndarray, reference: np.ndarray, weight: np.ndarray) -> tuple[float, float]:
+    """Weighted line through the change of block means over their level, twice: what moved counts once."""
+    slope, level = _line(change, reference, weight)
+    z2 = weight * (change - slope * reference - level) ** 2
+    still = z2 <= max(SIGNIFICANT**2, 9 * float(np.median(z2)))
+    slope, level = _line(change[still], reference[still], weight[still])
+    return 1.0 + slope, level
+
+
+def _line(change: np.ndarray, reference: np.ndarray, weight: np.ndarray) -> tuple[float, float]:
+    """(slope, intercept); 0 where they are not significant, or the slope where the contrast is too small."""
+    total = weight.sum()
+    middle = float((weight * reference).sum() / total)
+    x = reference - middle
+    spread = float((weight * x**2).sum())
+    level = float((weight * change).sum() / total)
+    slope = float((weight * x * change).sum() / spread) if spread > _MIN_CONTRAST * len(x) else 0.0
+    if abs(slope) * np.sqrt(spread) < SIGNIFICANT:
+        slope = 0.0
+    if slope == 0.0 and abs(level) * np.sqrt(total) < SIGNIFICANT:
+        level = 0.0
+    return slope, level - slope * middle
