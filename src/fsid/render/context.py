@@ -1,0 +1,84 @@
+"""The process's one OpenGL context: EGL without a window, OpenGL 4.3 core.
+
+Two contexts in one process corrupt each other silently (a moderngl object does not know which context it
+belongs to), so a second one is refused. The libraries are opened by their run-time names, because the
+unversioned ones exist only where development packages are installed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import moderngl
+
+from fsid.errors import FsidError
+
+REQUIRED_VERSION = 430
+_MAX_DEVICES = 16
+_SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swiftshader")
+_HELP = (
+    "install the Debian packages libegl1 libgl1 libgl1-mesa-dri for software rendering; in an NVIDIA container "
+    "set NVIDIA_DRIVER_CAPABILITIES=graphics (or all) for the GPU"
+)
+
+
+@dataclass(frozen=True)
+class GlInfo:
+    """What renders. version: OpenGL version with the driver's. is_software: on the CPU, not on a GPU."""
+
+    vendor: str
+    renderer: str
+    version: str
+    is_software: bool
+
+
+def open_context(device_index: int | None) -> moderngl.Context:
+    """A current context on EGL device `device_index`; None takes the first GPU, or else the CPU.
+
+    Raises FsidError where no device of that index gives OpenGL 4.3.
+    """
+    if device_index is not None:
+        return _create(device_index)
+    first_error: FsidError | None = None
+    software: int | None = None
+    for index in range(_MAX_DEVICES):
+        try:
+            context = _create(index)
+        except FsidError as error:
+            first_error = first_error or error
+            continue
+        if not gl_info(context).is_software:
+            return context
+        context.release()
+        software = index if software is None else software
+    if software is None:
+        assert first_error is not None
+        raise first_error
+    return _create(software)
+
+
+def gl_info(context: moderngl.Context) -> GlInfo:
+    """Vendor, device and version of the context."""
+    info: dict[str, Any] = context.info
+    renderer = str(info["GL_RENDERER"])
+    return GlInfo(
+        vendor=str(info["GL_VENDOR"]),
+        renderer=renderer,
+        version=str(info["GL_VERSION"]),
+        is_software=any(name in renderer.lower() for name in _SOFTWARE),
+    )
+
+
+def _create(device_index: int) -> moderngl.Context:
+    try:
+        return moderngl.create_context(
+            standalone=True,
+            backend="egl",
+            libgl="libGL.so.1",
+            libegl="libEGL.so.1",
+            require=REQUIRED_VERSION,
+            device_index=device_index,
+        )
+    except Exception as error:  # the EGL backend raises bare Exception
+        raise FsidError(f"no OpenGL 4.3 on EGL device {device_index} ({error}): {_HELP}") from None

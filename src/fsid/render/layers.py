@@ -1,0 +1,182 @@
+"""Material maps -> texture layers, resident within a memory budget, the least recently used leave first.
+
+    array 0: mix, pattern, detail, roughness
+    array 1: slope u, slope v (height gradient, metres per metre), spread, metallic
+
+Normals are stored as slopes because slopes average correctly over a footprint while 8-bit heights would
+give steps. `spread` is the standard deviation of the slopes that a mip level has averaged away; the shader
+turns it into roughness (Olano and Baker 2010, "LEAN Mapping": lost slope variance is microfacet variance),
+so that glossy relief does not sparkle when it is small in the image. Mip levels are averaged here in
+float, not by the driver: alike everywhere, and rounded once.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable, Hashable, Iterable
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+
+from fsid.assets import MaterialMaps
+from fsid.render.programs import load_compute
+
+Bake = Callable[[str, int, int], MaterialMaps]
+"""(family, variant, size) -> maps."""
+
+BUDGET_BYTES = 1600 * 2**20
+"""Texture memory: 136 layers (every variant of 34 families) of 1024 texels; a scene that needs more gets more."""
+
+_RGBA8 = 0x8058
+_FIRST_LAYERS = 16
+_ANISOTROPY = 1.0  # llvmpipe takes 200 times as long for a fragment at 4.0
+
+
+@dataclass(frozen=True)
+class Layer:
+    """index: in the texture arrays. slope_scale: of the stored slopes. shares: (3,) mean weights of the
+    three colours, so that mean albedo = shares @ colours."""
+
+    index: int
+    slope_scale: float
+    shares: np.ndarray
+
+
+@dataclass(frozen=True)
+class Texels:
+    """levels: per mip level (2, s, s, 4) uint8. slope_scale and shares as in `Layer`."""
+
+    levels: list[np.ndarray]
+    slope_scale: float
+    shares: np.ndarray
+
+
+def texels_of(maps: MaterialMaps) -> Texels:
+    """All mip levels of both arrays of one material."""
+    size = len(maps.height)
+    gain = maps.relief_m * size / (2 * maps.tile_m)
+    slopes = (
+        np.stack([np.roll(maps.height, -1, a) - np.roll(maps.height, 1, a) for a in (1, 0)], axis=-1) * gain
+    )
+    slope_scale = float(max(np.quantile(np.abs(slopes[::2, ::2]), 0.999), 1e-4))
+    slopes = np.clip(slopes / slope_scale, -1.0, 1.0)
+    masks = np.stack([maps.mix, maps.pattern, maps.detail, maps.roughness, maps.metallic], axis=-1)
+    masks, slopes, squares = (a.astype(np.float32) for a in (masks, slopes, (slopes**2).mean(-1)))
+    levels = []
+    while True:
+        spread = np.sqrt(np.maximum(squares - (slopes**2).mean(-1), 0.0))
+        level = np.empty((2, *spread.shape, 4), np.uint8)
+        level[0] = _unorm(masks[..., :4])
+        level[1, ..., :2] = np.rint(slopes * 127) + 128
+        level[1, ..., 2] = _unorm(spread)
+        level[1, ..., 3] = _unorm(masks[..., 4])
+        levels.append(level)
+        if len(spread) == 1:
+            return Texels(levels, slope_scale, _colour_shares(maps))
+        masks, slopes, squares = _halved(masks), _halved(slopes), _halved(squares)
+
+
+def _colour_shares(maps: MaterialMaps) -> np.ndarray:
+    ground = 2 * maps.detail * (1 - maps.pattern)
+    shares = ((1 - maps.mix) * ground, maps.mix * ground, 2 * maps.detail * maps.pattern)
+    return np.array([s.mean(dtype=np.float64) for s in shares])
+
+
+def _unorm(values: np.ndarray) -> np.ndarray:
+    return np.rint(values * 255)
+
+
+def _halved(values: np.ndarray) -> np.ndarray:
+    """2 x 2 box average of (s, s, ...)."""
+    rows = values[::2] + values[1::2]
+    return (rows[:, ::2] + rows[:, 1::2]) * np.float32(0.25)
+
+
+class LayerStore:
+    """The resident layers. What a layer holds depends on its material alone, never on its slot."""
+
+    def __init__(self, context: moderngl.Context, size: int, budget_bytes: int = BUDGET_BYTES) -> None:
+        self._context = context
+        self._size = size
+        self._levels = size.bit_length()
+        self._budget_layers = max(1, budget_bytes * 3 // (size * size * 8 * 4))
+        self._upload = load_compute(context, "upload_level.comp")
+        self._copy = load_compute(context, "copy_level.comp")
+        self._resident: OrderedDict[Hashable, Layer] = OrderedDict()
+        self._arrays: list[moderngl.TextureArray] = []
+        self._capacity = 0
+
+    def load(self, materials: Iterable[tuple[str, int]], bake: Bake) -> dict[tuple[str, int], Layer]:
+        """Layers of all (family, variant), baked where they are not resident."""
+        wanted = list(dict.fromkeys(materials))
+        for key in wanted:
+            if key in self._resident:
+                self._resident.move_to_end(key)
+        missing = [key for key in wanted if key not in self._resident]
+        if missing:
+            self._make_room(len(missing), len(wanted))
+        for key in missing:
+            self._resident[key] = self._write(texels_of(bake(*key, self._size)))
+        return {key: self._resident[key] for key in wanted}
+
+    def use(self, masks_unit: int, relief_unit: int) -> None:
+        """Bind the two arrays to texture units."""
+        for array, unit in zip(self._arrays, (masks_unit, relief_unit), strict=True):
+            array.use(unit)
+
+    def _make_room(self, missing: int, wanted: int) -> None:
+        needed = len(self._resident) + missing
+        limit = max(self._budget_layers, wanted)
+        while needed > limit:
+            self._resident.popitem(last=False)
+            needed -= 1
+        if needed > self._capacity:
+            self._grow(min(max(needed, 2 * self._capacity, _FIRST_LAYERS), limit))
+
+    def _grow(self, capacity: int) -> None:
+        """New arrays with the resident layers moved to the front, level by level."""
+        old = self._arrays
+        self._arrays = [self._new_array(capacity) for _ in range(2)]
+        self._capacity = capacity
+        moved = OrderedDict()
+        for slot, (key, layer) in enumerate(self._resident.items()):
+            for source, target in zip(old, self._arrays, strict=True):
+                for level in range(self._levels):
+                    source.use(0)
+                    self._copy["source_layer"] = layer.index
+                    self._run(self._copy, target, slot, level)
+            moved[key] = Layer(slot, layer.slope_scale, layer.shares)
+        self._resident = moved
+        for array in old:
+            array.release()
+
+    def _new_array(self, capacity: int) -> moderngl.TextureArray:
+        array = self._context.texture_array((self._size, self._size, capacity), 4)
+        array.build_mipmaps()
+        array.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+        return array
+
+    def _write(self, texels: Texels) -> Layer:
+        taken = {layer.index for layer in self._resident.values()}
+        slot = next(i for i in range(self._capacity) if i not in taken)
+        for level, data in enumerate(texels.levels):
+            for array, level_texels in zip(self._arrays, data, strict=True):
+                buffer = self._context.buffer(level_texels.tobytes())
+                buffer.bind_to_storage_buffer(0)
+                self._run(self._upload, array, slot, level)
+                buffer.release()
+        return Layer(slot, texels.slope_scale, texels.shares)
+
+    def _run(
+        self, program: moderngl.ComputeShader, target: moderngl.TextureArray, slot: int, level: int
+    ) -> None:
+        """One level of one layer, in groups of 8 x 8 texels."""
+        target.bind_to_image(0, read=False, write=True, level=level, format=_RGBA8)
+        if program is self._copy:
+            program["level"] = level
+        program["layer"] = slot
+        program["size"] = self._size >> level
+        groups = max(1, (self._size >> level) // 8)
+        program.run(groups, groups)
+        self._context.memory_barrier()

@@ -1,0 +1,17 @@
+#version 430 core
+// Depth only, for the prepass and the shadow maps: rows of `axes` are right, up, forward.
+#include "surfaces.glsl"
+in vec3 in_position;
+in uint in_surface;
+uniform vec3 origin;
+uniform mat3 axes;
+uniform vec2 focal;
+uniform vec2 shift;
+uniform float near;
+invariant gl_Position;
+
+void main() {
+    Surface s = surfaces[in_surface];
+    vec3 local = axes * (to_world(s, to_metric(s, in_position)) - origin);
+    gl_Position = vec4(local.xy * focal + shift * local.z, local.z - 2.0 * near, local.z);
+}

@@ -1,0 +1,28 @@
+#version 430 core
+// As depth.vert, with what the surface shader needs; gl_Position must be the same to the bit.
+#include "surfaces.glsl"
+in vec3 in_position;
+in vec3 in_normal;
+in uint in_surface;
+uniform vec3 origin;
+uniform mat3 axes;
+uniform vec2 focal;
+uniform vec2 shift;
+uniform float near;
+invariant gl_Position;
+out vec3 metric;          // position in the metric space of the object
+out vec3 metric_normal;
+out vec3 from_camera;     // world axes
+out float distance_m;     // along the viewing axis
+flat out uint surface_index;
+
+void main() {
+    Surface s = surfaces[in_surface];
+    metric = to_metric(s, in_position);
+    metric_normal = in_normal / s.scale.xyz;
+    from_camera = to_world(s, metric) - origin;
+    vec3 local = axes * from_camera;
+    distance_m = local.z;
+    surface_index = in_surface;
+    gl_Position = vec4(local.xy * focal + shift * local.z, local.z - 2.0 * near, local.z);
+}
