@@ -21,9 +21,9 @@ class SceneConfig:
 
     objects: tuple[int, int] = (25, 45)
     """N, number of objects, both ends included."""
-    object_size_m: Range = (0.15, 0.9)
+    object_size_m: Range = (0.18, 0.9)
     """Largest side of an object after scaling (variant full); log-uniform."""
-    spread_m: float = 1.5
+    spread_m: float = 1.1
     """Objects lie within this distance of the focus."""
     floating_share: float = 0.35
     """Share of objects in the air instead of at rest on the floor or on each other (variant full)."""
@@ -46,7 +46,7 @@ class SceneConfig:
     """Factor on the relief of the height maps."""
     albedo: Range = (0.02, 0.9)
     """Limits of the linear albedo of surface colours, per channel."""
-    palette_shares: tuple[float, float, float, float] = (0.45, 0.25, 0.15, 0.15)
+    palette_shares: tuple[float, float, float, float] = (0.5, 0.25, 0.07, 0.18)
     """Shares of the palette models natural, harmonised, lab, grey; sum 1."""
 
     room_width_m: Range = (3.0, 6.0)
@@ -60,7 +60,7 @@ class SceneConfig:
     """Share of lights that are spots; the rest are points."""
     irradiance: Range = (1.0, 10.0)
     """Irradiance of all lights together at the focus, radiance units x sr; log-uniform."""
-    light_temperature_k: Range = (2300.0, 9000.0)
+    light_temperature_k: Range = (3000.0, 9000.0)
     """Colour temperature of a light; log-uniform."""
     tinted_light_share: float = 0.1
     """Share of lights with a coloured filter (LED) on top of their temperature."""
@@ -68,7 +68,7 @@ class SceneConfig:
     """Radius of the emitting sphere; log-uniform."""
     light_distance_m: Range = (0.9, 2.2)
     """Distance of a light from the focus."""
-    ambient_share: Range = (0.04, 0.3)
+    ambient_share: Range = (0.06, 0.3)
     """Irradiance from the surroundings relative to that from the lights; log-uniform."""
 
     camera_distance_m: Range = (0.6, 2.5)

@@ -1,6 +1,6 @@
 """T: where objects stand. Two arrangements of one list of meshes around the origin of the floor.
 
-    arranged   variants v1-v3: upright in slots that depend on no seed, tops below z = 0.14 m + 0.3 rho
+    arranged   variants v1-v3: upright in slots that depend on no seed, tops below z = 0.19 m + 0.32 rho
     scattered  variant v4: random rotation (20 angles per axis), scale and place, at rest or floating
 
 Density matters more than order: objects may touch and overlap, but none may swallow the camera or a
@@ -37,10 +37,10 @@ def arranged(rng: np.random.Generator, meshes: Sequence[Mesh], spread_m: float) 
     for i, mesh in enumerate(meshes):
         rho = spread_m * np.sqrt((i + 0.3) / len(meshes))
         angle = 2.399963 * i
-        width = (0.22 + 0.28 * rho) * rng.uniform(0.8, 1.25)
+        width = (0.3 + 0.3 * rho) * rng.uniform(0.8, 1.25)
         turn_deg = 90.0 * int(rng.integers(4))
         extent = np.ptp(mesh.vertices, axis=0)
-        height = 0.14 + 0.3 * max(rho - width / 2, 0.0)
+        height = 0.19 + 0.32 * max(rho - width / 2, 0.0)
         scale = float(min(width / extent[:2].max(), height / extent[2]))
         place = (float(rho * np.cos(angle)), float(rho * np.sin(angle)), 0.0)
         out.append(Transform(place, (0.0, 0.0, turn_deg), (scale, scale, scale)))
@@ -82,7 +82,7 @@ def scattered(
 
 def _spots_rand(rng: np.random.Generator, room_m: Vec3, focus_m: np.ndarray, spread_m: float) -> np.ndarray:
     """(K, 3) candidate centres, denser towards the focus, inside the room."""
-    rho = spread_m * rng.random(_CANDIDATES) ** 0.75
+    rho = spread_m * rng.random(_CANDIDATES)
     phi = rng.uniform(0, 2 * np.pi, _CANDIDATES)
     z = focus_m[2] + rng.normal(0.15, 0.4, _CANDIDATES)
     spots = np.c_[focus_m[0] + rho * np.cos(phi), focus_m[1] + rho * np.sin(phi), z]

@@ -72,7 +72,7 @@ def sample(config: SceneConfig, seed: int, *, width: int, height: int, variant: 
         rngs = [np.random.default_rng(s) for s in streams.T.spawn(len(S))]
         T = scattered(rngs, meshes, B.size_m, focus, keep_clear, config)
     else:
-        T = arranged(np.random.default_rng(fixed.T), meshes, min(config.spread_m, min(B.size_m[:2]) / 2))
+        T = arranged(np.random.default_rng(fixed.T), meshes, min(config.spread_m, config.room_width_m[0] / 2))
     return Scene(seed, variant, S, M, tuple(T), B, lights, ambient, (camera,))
 
 
