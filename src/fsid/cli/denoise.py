@@ -11,7 +11,7 @@ from fsid.errors import FsidError
 
 
 def denoise(
-    input: Positional[Path],  # noqa: A002  the fixed name
+    input: Positional[Path],
     output: Positional[Path],
     *,
     model: Path,

@@ -5,7 +5,7 @@ from fsid.denoise.files import MosaicLayout, denoise_file
 from fsid.denoise.model import Denoiser, ModelCard, load_model, save_model
 from fsid.denoise.raw_denoiser import NetworkConfig, RawDenoiser
 from fsid.denoise.train import load_history, train
-from fsid.denoise.train_config import TrainConfig
+from fsid.denoise.train_config import TrainConfig, train_config
 
 __all__ = [
     "Denoiser",
@@ -20,4 +20,5 @@ __all__ = [
     "load_model",
     "save_model",
     "train",
+    "train_config",
 ]

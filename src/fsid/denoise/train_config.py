@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from importlib.resources import as_file, files
+from pathlib import Path
 
+from fsid.config import load_settings
 from fsid.denoise.raw_denoiser import NetworkConfig
 from fsid.errors import FsidError
 
@@ -57,3 +61,12 @@ class TrainConfig:
             raise FsidError(
                 f"iso_min {self.iso_min} and iso_max {self.iso_max}: must satisfy 0 < iso_min <= iso_max"
             )
+
+
+def train_config(name_or_file: str | Path, overrides: Sequence[str] = ()) -> TrainConfig:
+    """A built-in configuration by name (`fsid/configs`), or a YAML file; `key=value` overrides on top."""
+    builtin = files("fsid.configs").joinpath(f"{name_or_file}.yaml")
+    if not builtin.is_file():
+        return load_settings(TrainConfig, Path(name_or_file), overrides)
+    with as_file(builtin) as file:
+        return load_settings(TrainConfig, file, overrides)

@@ -21,7 +21,6 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from fsid.config import load_settings
 from fsid.dataset import (
     GenerateConfig,
     find_shards,
@@ -32,13 +31,14 @@ from fsid.dataset import (
     shard_keys,
     to_uint8,
 )
-from fsid.denoise import TrainConfig, denoise_raw, load_history, load_model, train
+from fsid.denoise import TrainConfig, load_history, train, train_config
 from fsid.errors import FsidError
 from fsid.evaluate.compare import CLASSICAL, NOISY, Comparison, Method, compare, write_results
+from fsid.evaluate.models import model_method
 from fsid.evaluate.plots import loss_plot, noise_profile_plot
 from fsid.evaluate.report import Section, comparison_sections, picture, write_report
 from fsid.evaluate.testset import photo_testset
-from fsid.sensor import NoiseLevel, develop, load_profile, read_mosaic
+from fsid.sensor import NoiseLevel, develop, load_profile, read_mosaic, read_raw
 
 PHOTOGRAPHS = (
     ("skimage", "data/astronaut.png"),
@@ -81,12 +81,12 @@ def demo(out: Path, config: DemoConfig, bar: ProgressBar) -> Path:
     if not 1 <= config.photographs <= len(PHOTOGRAPHS):
         raise FsidError(f"--photographs {config.photographs}: there are 1 to {len(PHOTOGRAPHS)}")
     data, run, testset = out / "data", out / "run", out / "testset"
-    generated = GenerateConfig(width=config.width, height=config.height)
+    generated = GenerateConfig(width=config.width, height=config.height, texture_size=512)
     with bar("rendering scenes", "pairs") as progress:
         generate(data, generated, count=config.scenes, seed=config.seed, shard_size=8, progress=progress)
     with bar("training on them", "steps") as progress:
         train(data, run, _training(config), progress=progress)
-    ours = _method(run, config)
+    ours = model_method(run, "ours")
     if not (testset / "testset.json").exists():
         photographs = _copy_photographs(out / "photographs", config.photographs)
         with bar("photographs to RAW", "photographs") as progress:
@@ -94,43 +94,31 @@ def demo(out: Path, config: DemoConfig, bar: ProgressBar) -> Path:
     with bar("measuring", "captures") as progress:
         comparison = compare(testset, [NOISY, CLASSICAL, ours], crop_levels=[CROP_LEVEL], progress=progress)
     write_results(comparison.rows, out / "results.json")
-    overview = _overview(out, ours)
-    save_png(out / "overview.png", overview)
     report = out / "report.html"
+    sections = [*comparison_sections(comparison), *_chain_sections(out, ours), *_real_raw_section(ours)]
     write_report(
-        report,
-        "FSID: trained on scenes, tested on photographs",
-        _lead(config, comparison),
-        [
-            *comparison_sections(comparison),
-            Section(
-                "Scenes", "All that the network was trained on.", pictures=((picture(_contact_sheet(data)),),)
-            ),
-            Section(
-                "A training pair",
-                "From left to right: scene, window of the clean RAW, of the noisy RAW, denoised; all developed.",
-                pictures=((picture(overview),),),
-            ),
-            Section(
-                "Noise",
-                "Var(x) = k x + sigma2.",
-                pictures=((noise_profile_plot(load_profile(CAMERA), ISOS),),),
-            ),
-            Section("Training", pictures=((loss_plot(*load_history(run)),),)),
-            *_real_raw_section(ours),
-        ],
+        report, "FSID: trained on scenes, tested on photographs", _lead(config, comparison), sections
     )
     return report
 
 
+def _chain_sections(out: Path, ours: Method) -> list[Section]:
+    """What the network was made from: scenes, a pair, the noise, the course of the training."""
+    overview = _overview(out, ours)
+    save_png(out / "overview.png", overview)
+    scenes = "All that the network was trained on."
+    pair = "From left to right: scene; a window of the clean RAW, the noisy RAW, the denoised RAW; all developed."
+    noise = noise_profile_plot(load_profile(CAMERA), ISOS)
+    return [
+        Section("Scenes", scenes, pictures=((picture(_contact_sheet(out / "data")),),)),
+        Section("A training pair", pair, pictures=((picture(overview),),)),
+        Section("Noise", "Var(x) = k x + sigma2, per CFA site.", pictures=((noise,),)),
+        Section("Training", pictures=((loss_plot(*load_history(out / "run")),),)),
+    ]
+
+
 def _training(config: DemoConfig) -> TrainConfig:
-    with as_file(files("fsid.configs").joinpath("nafnet-tiny.yaml")) as file:
-        return load_settings(TrainConfig, file, [f"steps={config.steps}"] if config.steps else [])
-
-
-def _method(run: Path, config: DemoConfig) -> Method:
-    model = load_model(run)
-    return Method("ours", f"{config.scenes} rendered scenes", lambda raw: denoise_raw(raw, model))
+    return train_config("nafnet-tiny", [f"steps={config.steps}"] if config.steps else [])
 
 
 def _copy_photographs(folder: Path, count: int) -> Path:

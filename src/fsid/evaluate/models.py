@@ -12,10 +12,10 @@ from fsid.evaluate.report import comparison_sections, write_report
 from fsid.evaluate.testset import read_testset
 
 
-def model_method(path: Path, name: str | None = None) -> Method:
-    """A trained model as a method; `name` defaults to the name of its folder or file."""
+def model_method(path: Path, name: str) -> Method:
+    """A trained model as a method; what it was trained on is in its card."""
     model = load_model(path)
-    return Method(name or path.resolve().stem, model.card.training, lambda raw: denoise_raw(raw, model))
+    return Method(name, model.card.training, lambda raw: denoise_raw(raw, model))
 
 
 def evaluate_models(
@@ -27,7 +27,7 @@ def evaluate_models(
 ) -> Comparison:
     """Compare the baselines and `models`; writes results.json and report.html into `out` unless None."""
     levels = read_testset(testset).levels
-    methods = [NOISY, CLASSICAL, *(model_method(path) for path in models)]
+    methods = [NOISY, CLASSICAL, *(model_method(path, path.resolve().stem) for path in models)]
     if out is not None:
         _make(out)
     comparison = compare(testset, methods, crop_levels=levels[len(levels) // 2 :][:1], progress=progress)
