@@ -61,6 +61,12 @@ class TestEveryMesh:
         against = (np.cross(b - a, c - a) * mesh.normals[mesh.faces].sum(1)).sum(1) <= 0
         assert against.mean() < 0.03
 
+    def test_no_triangle_interpolates_its_normal_through_zero(self, family, seed):
+        """Opposed normals at two corners have no direction half-way: a shader would divide by zero."""
+        mesh = build_mesh(family, seed)
+        a, b, c = (mesh.normals[mesh.faces[:, k]] for k in range(3))
+        assert min((p * q).sum(1).min() for p, q in ((a, b), (b, c), (c, a))) > -0.9
+
     def test_every_part_encloses_a_volume(self, family, seed):
         """Outward winding everywhere: a sheet too has two sides and a rim."""
         mesh = build_mesh(family, seed)

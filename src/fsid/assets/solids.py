@@ -247,12 +247,13 @@ def _frames(tangents: np.ndarray, closed: bool) -> tuple[np.ndarray, np.ndarray]
 
 
 def _rim(bottom: np.ndarray, top: np.ndarray, normals: np.ndarray) -> Solid:
-    """The strip that closes a sheet; `bottom` and `top` run once around its border."""
-    along = np.roll(bottom, -1, axis=0) - np.roll(bottom, 1, axis=0)
-    outward = np.cross(along, normals)
+    """The strip that closes a sheet, flat per edge; `bottom` and `top` run once around its border."""
+    after = np.roll(np.arange(len(bottom)), -1)
+    outward = np.cross(bottom[after] - bottom, normals + normals[after])
     outward /= np.maximum(_length(outward), 1e-30)
-    faces = _grid_faces(2, len(bottom), wrap_cols=True)
-    return Solid(np.vstack([bottom, top]), np.vstack([outward, outward]), faces)
+    corners = np.stack([bottom, bottom[after], top[after], top], axis=1)
+    quads = 4 * np.arange(len(bottom))[:, None, None] + np.array([(0, 1, 2), (0, 2, 3)])
+    return Solid(corners.reshape(-1, 3), np.repeat(outward, 4, axis=0), quads.reshape(-1, 3))
 
 
 @lru_cache(maxsize=8)

@@ -49,7 +49,11 @@ def knot(rng: np.random.Generator) -> Parts:
     for k in range(1, int(rng.integers(3, 6))):
         path += rng.normal(0, 1 / k, 3) * np.cos(k * t) + rng.normal(0, 1 / k, 3) * np.sin(k * t)
     path *= rng.uniform(0.15, 0.3) / np.abs(path).max()
-    thick = rng.uniform(0.012, 0.035)
+    along = np.roll(path, -1, axis=0) - path
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    bend = np.linalg.norm(np.roll(along, -1, axis=0) - along, axis=1)
+    tightest = (np.linalg.norm(np.roll(path, -1, axis=0) - path, axis=1) / bend).min()
+    thick = min(rng.uniform(0.012, 0.035), 0.7 * tightest)
     radius = thick * (1 + rng.uniform(0, 0.25) * np.cos(int(rng.integers(5, 40)) * t[:, 0]))
     return {"tube": [sweep(path, radius, 14, closed=True)]}
 
