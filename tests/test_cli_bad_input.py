@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+import re
 from pathlib import Path
 
 import numpy as np
@@ -50,6 +52,12 @@ CASES = [
     ("preview {0}/out.png --count 0", "--count"),
     ("scene 1 -o {0}/scene.txt", "scene.txt"),
     ("scene 1 -o {0}/none/scene.json", "scene.json"),
+    ("calibrate -o {0}/out.yaml", "at least one burst"),
+    ("calibrate {0}/none.dng -o {0}/out.yaml", "none.dng"),
+    ("calibrate {0}/text.dng -o {0}/out.yaml", "text.dng"),
+    ("calibrate {0}/nan.npy -o {0}/out.yaml", "nan.npy"),
+    ("calibrate {0}/gray8.png -o {0}/out.yaml --black-level 0", "gray8.png"),
+    ("calibrate {0}/gray8.png -o {0}/out.yaml --black-level 900 --white-level 255", "gray8.png"),
     ("profiles nokia", "nokia"),
     ("profiles {0}/text.yaml", "text.yaml"),
     ("develop {0}/none.dng {0}/out.png", "none.dng"),
@@ -88,10 +96,19 @@ def test_every_command_is_in_the_list_of_cases():
 
 
 @pytest.mark.parametrize("command", [*COMMANDS, ""])
-def test_help_describes_every_option(command: str, capsys: pytest.CaptureFixture[str]):
+def test_help_says_what_a_command_does(command: str, capsys: pytest.CaptureFixture[str]):
     with pytest.raises(SystemExit) as stop:
         main([*command.split(), "--help"])
     assert stop.value.code == 0
-    text = capsys.readouterr().out
-    for line in text.splitlines():
-        assert not line.strip("│ ").startswith("(default"), f"an option without a description: {line}"
+    words = " ".join(re.sub("[│•]", " ", capsys.readouterr().out).split())
+    for name in [command] if command else COMMANDS:
+        summary = (inspect.getdoc(COMMANDS[name]) or "").partition("\n")[0]
+        assert summary
+        assert summary in words
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_option_is_described(command: str):
+    function = COMMANDS[command]
+    for name in inspect.signature(function).parameters:
+        assert re.search(rf"^ +{name}: \S", inspect.getdoc(function) or "", re.M), name

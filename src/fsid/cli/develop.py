@@ -14,8 +14,9 @@ def develop(input: Positional[Path], output: Positional[Path]) -> None:
         input: DNG or any other Bayer RAW that LibRaw opens.
         output: PNG file to write, 8 bit, sRGB.
     """
-    from fsid.dataset import save_png
+    from fsid.dataset import check_png, save_png
     from fsid.sensor import develop as develop_raw
     from fsid.sensor import read_raw
 
+    check_png(output)
     save_png(output, develop_raw(read_raw(input)))

@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.text import Text
 
 from fsid.cli import (
+    calibrate,
     demo,
     denoise,
     develop,
@@ -29,6 +30,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "generate": generate.generate,
     "preview": preview.preview,
     "scene": scene.scene,
+    "calibrate": calibrate.calibrate,
     "profiles": profiles.profiles,
     "train": train.train,
     "denoise": denoise.denoise,
@@ -59,7 +61,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if error.name not in EXTRAS:
             raise
         _fail(
-            f"this command needs {error.name}, which is not installed: pip install 'fsid[{EXTRAS[error.name]}]'"
+            f"this command needs {error.name}, which is not installed: "
+            f"pip install 'fsid[{EXTRAS[error.name]}]'"
         )
     except KeyboardInterrupt:
         Console(stderr=True).print("fsid: interrupted; run the same command again to continue")

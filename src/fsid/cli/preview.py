@@ -36,8 +36,9 @@ def preview(
         variant: What varies between scenes.
         quiet: No progress bar.
     """
-    from fsid.dataset import GenerateConfig, contact_sheet, save_png
+    from fsid.dataset import GenerateConfig, check_png, contact_sheet, save_png
 
+    check_png(output)
     overrides = [*set, f"width={width}", f"height={height}", f"variant={variant}"]
     settings = load_settings(GenerateConfig, config, overrides)
     with progress_bar("scenes", "scenes", quiet=quiet) as progress:

@@ -30,8 +30,7 @@ class _Rate(ProgressColumn):
 
 @contextmanager
 def progress_bar(label: str, unit: str, *, quiet: bool) -> Iterator[Callable[[int, int], None]]:
-    """Yields progress(done, total), both in `unit`s, for a `with` block."""
-    console = Console(stderr=True, quiet=quiet)
+    """Yields progress(done, total), both in `unit`s, for a `with` block; the bar appears at the first."""
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -39,10 +38,14 @@ def progress_bar(label: str, unit: str, *, quiet: bool) -> Iterator[Callable[[in
         _Rate(unit),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=console) as bar:
-        task = bar.add_task(label, total=None)
+    bar = Progress(*columns, console=Console(stderr=True, quiet=quiet))
+    task = bar.add_task(label, total=None)
 
-        def progress(done: int, total: int) -> None:
-            bar.update(task, completed=done, total=total)
+    def progress(done: int, total: int) -> None:
+        bar.start()
+        bar.update(task, completed=done, total=total)
 
+    try:
         yield progress
+    finally:
+        bar.stop()

@@ -3,7 +3,7 @@
 from fsid.dataset.config import GenerateConfig
 from fsid.dataset.generate import DatasetConfig, generate
 from fsid.dataset.photos import find_photos, read_photo
-from fsid.dataset.picture import contact_sheet, grid, save_png
+from fsid.dataset.picture import check_png, contact_sheet, grid, save_png
 from fsid.dataset.sample import Sample, encode, make_sample, sample_key, scene_of, to_uint8
 from fsid.dataset.shards import find_shards, read_member, shard_keys, shard_path, write_shard
 
@@ -11,6 +11,7 @@ __all__ = [
     "DatasetConfig",
     "GenerateConfig",
     "Sample",
+    "check_png",
     "contact_sheet",
     "encode",
     "find_photos",

@@ -19,14 +19,21 @@ GAP_PX = 4
 
 def save_png(path: Path, srgb: np.ndarray) -> None:
     """Write a (H, W, 3) sRGB image, 0..1 float or uint8, as PNG; FsidError where it cannot be written."""
-    if path.suffix.lower() != ".png":
-        raise FsidError(f"{path}: pictures are written as .png")
+    check_png(path)
     pixels = srgb if srgb.dtype == np.uint8 else to_uint8(srgb)
     try:
         Image.fromarray(pixels).save(path)
     except OSError as error:
         path.unlink(missing_ok=True)
         raise FsidError(f"{path}: cannot be written ({error.strerror})") from None
+
+
+def check_png(path: Path) -> None:
+    """FsidError unless `path` names a PNG file in a folder that exists."""
+    if path.suffix.lower() != ".png":
+        raise FsidError(f"{path}: pictures are written as .png")
+    if not path.parent.is_dir():
+        raise FsidError(f"{path}: its folder does not exist")
 
 
 def contact_sheet(

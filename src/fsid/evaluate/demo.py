@@ -107,7 +107,7 @@ def _chain_sections(out: Path, ours: Method) -> list[Section]:
     overview = _overview(out, ours)
     save_png(out / "overview.png", overview)
     scenes = "All that the network was trained on."
-    pair = "From left to right: scene; a window of the clean RAW, the noisy RAW, the denoised RAW; all developed."
+    pair = "Scene, then a window of the clean RAW, the noisy RAW and the denoised RAW, all developed."
     noise = noise_profile_plot(load_profile(CAMERA), ISOS)
     return [
         Section("Scenes", scenes, pictures=((picture(_contact_sheet(out / "data")),),)),
@@ -122,7 +122,7 @@ def _training(config: DemoConfig) -> TrainConfig:
 
 
 def _copy_photographs(folder: Path, count: int) -> Path:
-    """Photographs that installed packages ship, as a folder: the test set names its images after the files."""
+    """Photographs that installed packages ship, as a folder."""
     folder.mkdir(parents=True, exist_ok=True)
     for package, name in PHOTOGRAPHS[:count]:
         with as_file(files(package).joinpath(name)) as file:
@@ -136,9 +136,10 @@ def _lead(config: DemoConfig, comparison: Comparison) -> str:
     over = psnr["ours", CROP_LEVEL] - psnr["classical", CROP_LEVEL]
     return (
         f"A small network, trained on {config.scenes} rendered scenes and nothing else, measured on "
-        f"{config.photographs} photographs with Pixel 6 noise. At ISO 3200: {gain:+.2f} dB over the noisy input, "
-        f"{over:+.2f} dB over the classical denoiser (RAW PSNR). ISO 6400 is beyond the published noise fit "
-        "(ISO 49 to 3199) and extrapolated."
+        f"{config.photographs} photographs with Pixel 6 noise. "
+        f"At ISO 3200: {gain:+.2f} dB over the noisy input, "
+        f"{over:+.2f} dB over the classical denoiser (RAW PSNR). "
+        "ISO 6400 is beyond the published noise fit (ISO 49 to 3199) and extrapolated."
     )
 
 
@@ -190,8 +191,9 @@ def _real_raw_section(ours: Method) -> list[Section]:
     return [
         Section(
             "A real phone RAW",
-            "A night photograph by a vivo X90 (sample of the AISP project), 12 bit, without a truth. No profile of "
-            f"this camera is known; k = {REAL_RAW_NOISE.k[0]:.1e} was read off the flat parts of the frame.",
+            "A night photograph by a vivo X90 (sample of the AISP project), 12 bit, without a truth. "
+            f"No profile of this camera is known; k = {REAL_RAW_NOISE.k[0]:.1e} was read off the flat "
+            "parts of the frame.",
             pictures=(
                 (picture(noisy, "as captured", pixelated=True), picture(denoised, "ours", pixelated=True)),
             ),

@@ -1,0 +1,81 @@
+"""fsid calibrate: a noise profile of your own camera, from repeated frames of a static scene."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+from tyro.conf import Positional
+
+from fsid.cli.arguments import Output
+from fsid.cli.progress import progress_bar
+
+
+def calibrate(
+    frames: Positional[tuple[Path, ...]],
+    *,
+    output: Output,
+    dark: tuple[Path, ...] = (),
+    iso: float | None = None,
+    plot: Path | None = None,
+    cfa: Literal["RGGB", "BGGR", "GRBG", "GBRG", "MONO"] | None = None,
+    black_level: int | None = None,
+    white_level: int | None = None,
+    width: int | None = None,
+    height: int | None = None,
+    camera: str | None = None,
+    tie_greens: bool = False,
+    quiet: bool = False,
+) -> None:
+    """Fit Var(x) = k x + sigma2 per CFA site and ISO to bursts of static scenes; write it as a profile.
+
+    Frames are sorted into bursts by the ISO and exposure time that they state. Notes say what was
+    compensated or left out.
+
+    Args:
+        frames: RAW files that LibRaw opens, or bare mosaics (.npy, 16-bit .png or .tif, .raw); folders
+            stand for their files. The ISO of bare mosaics is --iso, or in their path: iso3200/a.png.
+        output: Profile to write, .yaml.
+        dark: Frames with the lens covered, of the same ISOs: they give black level and sigma2.
+        iso: ISO of all bare mosaics.
+        plot: Picture of samples, lines and residuals to write (.png, .pdf or .svg).
+        cfa: Colours of a bare mosaic's first 2x2 pixels, read row by row; MONO for no colour filters.
+        black_level: Black level of bare mosaics in DN; needed where there are no dark frames.
+        white_level: White level (saturation) of bare mosaics in DN; by default from the largest value.
+        width: Width of .raw or .bin mosaics in pixels.
+        height: Height of .raw or .bin mosaics in pixels.
+        camera: Name of the camera for the profile; by default the files'.
+        tie_greens: Fit one line to Gr and Gb.
+        quiet: No progress bar, no table.
+    """
+    from fsid.sensor import Layout, save_profile
+    from fsid.sensor import calibrate as calibrate_frames
+
+    layout = Layout(iso, cfa, black_level, white_level, width, height)
+    with progress_bar("reading", "frames", quiet=quiet) as progress:
+        found = calibrate_frames(
+            frames,
+            name=output.stem,
+            dark=dark,
+            layout=layout,
+            camera=camera,
+            tie_greens=tie_greens,
+            progress=progress,
+        )
+    if plot is not None:
+        from fsid.sensor.fit_plot import plot_calibration
+
+        plot_calibration(plot, found)
+    save_profile(output, found.profile)
+    for note in found.notes:
+        Console(stderr=True, quiet=quiet).print(Text(f"note: {note}"), soft_wrap=True)
+    table = Table("ISO", "site", "black (DN)", "k (DN)", "±", "sigma2 (DN²)", "±", title=found.profile.camera)
+    for level, fit in zip(found.profile.iso, found.fits, strict=True):
+        for site, label in enumerate(("R", "Gr", "Gb", "B") if len(fit.k_dn) == 4 else ("mono",)):
+            values = (fit.k_dn, fit.k_dn_error, fit.sigma2_dn, fit.sigma2_dn_error)
+            figures = [f"{value[site]:.4g}" for value in values]
+            table.add_row(f"{level:g}", label, f"{fit.black[site]:.2f}", *figures)
+    Console(quiet=quiet).print(table)
