@@ -6,16 +6,17 @@ import re
 import shlex
 import shutil
 import tarfile
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from fsid.cli.main import COMMANDS, main
-from fsid.sensor import read_raw, to_dn
+from fsid.sensor import Raw, load_profile, noisy_from_clean, read_raw, to_dn
 
 REPOSITORY = Path(__file__).resolve().parents[1]
-GUIDES = ("noise-profiles.md", "generate.md", "train-and-denoise.md", "evaluate.md")
+GUIDES = ("noise-profiles.md", "generate.md", "calibrate.md", "train-and-denoise.md", "evaluate.md")
 
 
 def commands(guide: str) -> list[str]:
@@ -28,7 +29,20 @@ def desk(tmp_path_factory: pytest.TempPathFactory, photos: Path) -> Path:
     """A folder with what the guides take as given: photographs."""
     folder = tmp_path_factory.mktemp("desk")
     shutil.copytree(photos, folder / "photographs")
+    write_bursts(folder)
     return folder
+
+
+def write_bursts(folder: Path) -> None:
+    """Twelve frames of a ramp and six dark ones at two ISOs, as arrays."""
+    rng, profile = np.random.default_rng(0), load_profile("galaxy-s22")
+    for kind, light, count in (("frames", 0.8, 12), ("dark", 0.0, 6)):
+        ramp = np.broadcast_to(np.linspace(0, light, 128, dtype=np.float32), (128, 128))
+        clean = Raw(ramp, "GBRG", 64, 1023, (2.0, 1.0, 1.6), np.eye(3))
+        (folder / kind).mkdir()
+        for iso, number in product((800, 3200), range(count)):
+            noisy = noisy_from_clean(rng, clean, iso, profile.level(iso))
+            np.save(folder / kind / f"iso{iso}_{number:02d}.npy", to_dn(noisy))
 
 
 def take_inputs_of_denoise(desk: Path) -> None:

@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from rich.console import Console
 from rich.table import Table
 from tyro.conf import Positional
 
+from fsid.errors import FsidError
 
-def profiles(name: Positional[str | None] = None) -> None:
+
+def profiles(name: Positional[str | None] = None, *, plot: Path | None = None) -> None:
     """List the built-in camera noise profiles, or show one: k and sigma2 per ISO and CFA site.
 
     Args:
         name: A built-in profile or a YAML file. All built-in profiles are listed where it is left out.
+        plot: Picture of k and sigma2 over ISO to write (.png, .pdf or .svg).
     """
     from fsid.sensor import load_profile, profile_names
 
     console = Console()
     if name is None:
+        if plot is not None:
+            raise FsidError("fsid profiles --plot: name the profile to plot")
         table = Table("name", "camera", "CFA", "black", "white", "ISO")
         for known in profile_names():
             profile = load_profile(known)
@@ -39,3 +46,7 @@ def profiles(name: Positional[str | None] = None) -> None:
         table.add_row(f"{iso:g}", f"{k:.3e}", f"{sigma2:.3e}", f"{sigma2**0.5 * span:.2f}")
     console.print(table)
     console.print(profile.source)
+    if plot is not None:
+        from fsid.sensor.fit_plot import plot_profile
+
+        plot_profile(plot, profile)

@@ -2,15 +2,18 @@
 
 from fsid.sensor.bare import read_mosaic
 from fsid.sensor.calibrate import NoiseFit, fit_noise
+from fsid.sensor.camera_fit import Calibration, calibrate
+from fsid.sensor.camera_profile import CameraProfile
 from fsid.sensor.colour import camera_to_srgb_matrix, colour_rand, srgb_to_camera_matrix
 from fsid.sensor.demosaic import demosaic
 from fsid.sensor.develop import develop, develop_linear
 from fsid.sensor.dng import dng_pixel_offset, read_raw, write_dng
 from fsid.sensor.exposure import expose, exposure_rand
+from fsid.sensor.frames import Layout
 from fsid.sensor.mosaic import bayer_crop, bayer_flip, mosaic, pack, unpack
 from fsid.sensor.noise import add_noise, level_rand, variance
 from fsid.sensor.pairs import clean_from_frame, clean_from_linear, clean_from_photo, noisy_from_clean
-from fsid.sensor.profiles import CameraProfile, load_profile, profile_names, save_profile
+from fsid.sensor.profiles import load_profile, profile_names, save_profile
 from fsid.sensor.quantise import clean_levels, from_dn, quantise, to_dn
 from fsid.sensor.raw import CFA_PATTERNS, NoiseLevel, Raw
 from fsid.sensor.temporal import TemporalStatistics
@@ -19,7 +22,9 @@ from fsid.sensor.unprocess import linear_to_camera, process, unprocess
 
 __all__ = [
     "CFA_PATTERNS",
+    "Calibration",
     "CameraProfile",
+    "Layout",
     "NoiseFit",
     "NoiseLevel",
     "Raw",
@@ -27,6 +32,7 @@ __all__ = [
     "add_noise",
     "bayer_crop",
     "bayer_flip",
+    "calibrate",
     "camera_to_srgb_matrix",
     "clean_from_frame",
     "clean_from_linear",

@@ -21,6 +21,8 @@ from fsid.sensor.mosaic import check_cfa, unpack
 from fsid.sensor.quantise import MAX_DN, check_levels, from_dn
 from fsid.sensor.raw import Raw
 
+BARE_SUFFIXES = (".raw", ".bin", ".npy", ".png", ".tif", ".tiff")
+
 
 def read_mosaic(
     path: str | Path,
@@ -41,22 +43,12 @@ def read_mosaic(
     white_level: DN. xyz_to_camera: the mean of the published matrices where None. FsidError: missing or
     unreadable file, wrong size, not integers, values above 16 bits.
     """
-    path = Path(path)
     check_cfa(cfa, f"{path}: cfa")
     check_levels(black_level, white_level, str(path))
     if len(white_balance) != 3 or not min(white_balance) > 0:
         raise FsidError(f"{path}: white_balance {white_balance} must be three positive gains")
-    if not path.is_file():
-        raise FsidError(f"{path}: no such mosaic file")
-    dn = _read(path, cfa, width, height)
-    if dn.ndim != 2 or min(dn.shape) < 2:
-        raise FsidError(f"{path}: holds an array of shape {dn.shape}, not a mosaic (height, width)")
-    if dn.dtype.kind not in "ui" or dn.min() < 0 or dn.max() > MAX_DN:
-        raise FsidError(f"{path}: holds {dn.dtype} values; a mosaic holds DN as integers from 0 to {MAX_DN}")
-    if (height or dn.shape[0], width or dn.shape[1]) != dn.shape:
-        raise FsidError(f"{path}: is {dn.shape[1]}x{dn.shape[0]}, not {width}x{height}; correct the size")
     return Raw(
-        mosaic=from_dn(dn[: dn.shape[0] // 2 * 2, : dn.shape[1] // 2 * 2], black_level, white_level),
+        mosaic=from_dn(read_dn(path, cfa=cfa, width=width, height=height), black_level, white_level),
         cfa=cfa,
         black_level=black_level,
         white_level=white_level,
@@ -67,7 +59,28 @@ def read_mosaic(
     )
 
 
-def _read(path: Path, cfa: str, width: int | None, height: int | None) -> np.ndarray:
+def read_dn(
+    path: str | Path, *, cfa: str | None = None, width: int | None = None, height: int | None = None
+) -> np.ndarray:
+    """The integers (H, W) of the mosaic file at `path`; an odd last row or column is dropped.
+
+    cfa: needed for packed .npy only. FsidError: missing or unreadable file, wrong size, not integers, values
+    above 16 bits.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise FsidError(f"{path}: no such mosaic file")
+    dn = _read(path, cfa, width, height)
+    if dn.ndim != 2 or min(dn.shape) < 2:
+        raise FsidError(f"{path}: holds an array of shape {dn.shape}, not a mosaic (height, width)")
+    if dn.dtype.kind not in "ui" or dn.min() < 0 or dn.max() > MAX_DN:
+        raise FsidError(f"{path}: holds {dn.dtype} values; a mosaic holds DN as integers from 0 to {MAX_DN}")
+    if (height or dn.shape[0], width or dn.shape[1]) != dn.shape:
+        raise FsidError(f"{path}: is {dn.shape[1]}x{dn.shape[0]}, not {width}x{height}; correct the size")
+    return dn[: dn.shape[0] // 2 * 2, : dn.shape[1] // 2 * 2]
+
+
+def _read(path: Path, cfa: str | None, width: int | None, height: int | None) -> np.ndarray:
     kind = path.suffix.lower()
     if kind in (".raw", ".bin"):
         return _read_headerless(path, width, height)
@@ -75,7 +88,7 @@ def _read(path: Path, cfa: str, width: int | None, height: int | None) -> np.nda
         if kind == ".npy":
             array = np.load(path, allow_pickle=False)
             packed = array.ndim == 3 and array.shape[2] == 4
-            return unpack(np.moveaxis(array, 2, 0), cfa) if packed else array
+            return unpack(np.moveaxis(array, 2, 0), cfa) if packed and cfa else array
         if kind == ".png":
             with Image.open(path) as image:
                 return np.asarray(image)

@@ -28,9 +28,13 @@ from fsid.sensor.temporal import TemporalStatistics
 LINEAR_SHARE = 0.7  # of the range above black; beyond it sensors saturate softly
 OUTLIER_PROBABILITY = 1e-6  # of Gaussian noise to look like a defective pixel
 OUTLIER_SHARE = 0.05  # of the pixels, above which the scene moved: sensors have fewer defects
-RESOLVED_DN2 = 0.33  # Gaussian noise of sigma 0.5 DN, rounded: its variance is true within 1 %
-_POOLS = 256
-_POOL_PIXELS = 200  # wanted in a pool on average
+RESOLVED_DN2 = (
+    0.5  # above it rounding adds its 1/12 DN^2 within 0.1 % of the variance, wherever between integers
+)
+_MAX_POOLS = 256  # in the range
+_POOL_WIDTH = 8.0  # standard errors of a pixel's mean
+_POOL_PIXELS = 200  # at least, but for the last one
+_GUIDES = 64  # parts of the pixels that tell how noise depends on light before there are pools
 _MIN_POOL_PIXELS = 50
 _REWEIGHTINGS = 10
 
@@ -122,27 +126,45 @@ def fit_samples(
 
 
 def _pool(mean: np.ndarray, variance: np.ndarray, frames: int, black: float, white: int) -> Samples:
-    signal, span = mean - black, white - black
-    if signal.size == 0:
+    order = np.argsort(mean)
+    signal, variance = mean[order] - black, variance[order]
+    if signal.size < _MIN_POOL_PIXELS:
         return Samples(np.empty(0), np.empty(0), np.empty(0), np.empty(0, bool))
-    pools = int(np.clip(signal.size // _POOL_PIXELS, 1, _POOLS))
-    index = np.clip((signal / span * pools).astype(np.int64), -1, pools - 1) + 1
-    sound = _sound(variance, index, pools + 1, frames)
-    index, signal, variance = index[sound], signal[sound], variance[sound]
-    count = np.bincount(index, minlength=pools + 1)
+    starts = _starts(signal, variance, frames, white - black)
+    sound = _sound(signal, variance, starts, frames)
+    count = np.add.reduceat(sound, starts, dtype=np.int64)
     full = count >= _MIN_POOL_PIXELS
-    signal, variance = (np.bincount(index, v, pools + 1)[full] / count[full] for v in (signal, variance))
-    used = (signal < LINEAR_SHARE * span) & (variance > RESOLVED_DN2)
+    signal, variance = (np.add.reduceat(v * sound, starts)[full] / count[full] for v in (signal, variance))
+    used = (signal < LINEAR_SHARE * (white - black)) & (variance > RESOLVED_DN2)
     return Samples(signal, variance, count[full] * (frames - 1.0), used)
 
 
-def _sound(variance: np.ndarray, index: np.ndarray, pools: int, frames: int) -> np.ndarray:
-    """(n,) False for pixels that vary more than Gaussian noise of their pool's median variance would."""
-    ends = np.cumsum(np.bincount(index, minlength=pools))
-    middles = (np.concatenate([[0], ends[:-1]]) + ends) // 2  # of each pool in ascending order of variance
-    median = variance[np.lexsort((variance, index))][np.minimum(middles, len(index) - 1)]
+def _starts(signal: np.ndarray, variance: np.ndarray, frames: int, span: float) -> np.ndarray:
+    """First index of each pool of the ascending `signal`.
+
+    A pool is at least `_POOL_WIDTH` standard errors of a pixel's mean wide. Narrower ones would sort pixels
+    by their noise and not by their light, and the slope would come out too small.
+    """
+    chunks = np.array_split(np.arange(signal.size), min(_GUIDES, signal.size // _MIN_POOL_PIXELS))
+    middles = np.array([signal[chunk].mean() for chunk in chunks])
+    errors = np.sqrt([np.median(variance[chunk]) / frames for chunk in chunks])
+    starts = [0]
+    while True:
+        start = starts[-1]
+        width = max(_POOL_WIDTH * float(np.interp(signal[start], middles, errors)), span / _MAX_POOLS)
+        end = max(int(np.searchsorted(signal, signal[start] + width)), start + _POOL_PIXELS)
+        if end > signal.size - _MIN_POOL_PIXELS:
+            return np.array(starts)
+        starts.append(end)
+
+
+def _sound(signal: np.ndarray, variance: np.ndarray, starts: np.ndarray, frames: int) -> np.ndarray:
+    """(n,) False for pixels that vary more than Gaussian noise of the usual variance at their signal."""
+    ends = [*starts[1:], signal.size]
+    medians = [np.median(variance[a:b]) for a, b in zip(starts, ends, strict=True)]
+    middles = [signal[a:b].mean() for a, b in zip(starts, ends, strict=True)]
     largest = chi2.ppf(1 - OUTLIER_PROBABILITY, frames - 1) / chi2.median(frames - 1)
-    sound = variance <= largest * np.maximum(median[index], RESOLVED_DN2)
+    sound = variance <= largest * np.maximum(np.interp(signal, middles, medians), RESOLVED_DN2)
     if sound.mean() < 1 - OUTLIER_SHARE:
         raise FsidError(
             f"{100 * (1 - sound.mean()):.0f} % of the pixels vary more than noise does: the scene or the "

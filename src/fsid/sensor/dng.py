@@ -9,6 +9,9 @@ a tar shard. The same image gives the same bytes: no clock, no software version.
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
@@ -72,6 +75,28 @@ def dng_pixel_offset(dng: str | Path | BinaryIO) -> int:
     return int(offsets[0])
 
 
+@dataclass(frozen=True)
+class RawHeader:
+    """What a RAW file says of its exposure. iso, exposure_s: 0 where unknown. date: "2026-11-21" or ""."""
+
+    camera: str
+    iso: float
+    exposure_s: float
+    date: str
+
+
+def read_header(path: str | Path) -> RawHeader:
+    """Camera, ISO, exposure time and date of a RAW file, without its pixels. Errors as in `read_raw`."""
+    with _opened(Path(path)) as (file, tags):
+        other = getattr(file, "other", None)  # rawpy 0.25 and later
+        return RawHeader(
+            camera=dng_tags.camera_name(tags),
+            iso=_iso(file, tags),
+            exposure_s=dng_tags.exposure_time_s(tags) or float(getattr(other, "shutter", 0.0)),
+            date=dng_tags.date_taken(tags),
+        )
+
+
 def read_raw(path: str | Path) -> Raw:
     """Any Bayer RAW file as `Raw`: visible area, even size, levels, CFA of its first pixel, colour, noise.
 
@@ -80,12 +105,19 @@ def read_raw(path: str | Path) -> Raw:
     FsidError: missing, truncated, no RAW, not Bayer (X-Trans, Foveon, linear DNG, monochrome).
     """
     path = Path(path)
+    with _opened(path) as (file, tags):
+        return _from_libraw(file, tags, path)
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[tuple[rawpy.RawPy, dict[int, Values]]]:
+    """LibRaw's view of a file and its TIFF tags; whatever LibRaw refuses becomes one line."""
     if not path.is_file():
         raise FsidError(f"{path}: no such RAW file")
     tags = _read_tags(path)
     try:
         with rawpy.imread(str(path)) as file:
-            return _from_libraw(file, tags, path)
+            yield file, tags
     except (rawpy.LibRawError, rawpy.NotSupportedError) as error:
         reason = error.args[0].decode() if error.args and isinstance(error.args[0], bytes) else error
         raise FsidError(f"{path}: not a RAW file that LibRaw can read ({reason})") from error
@@ -148,7 +180,7 @@ def _from_libraw(file: rawpy.RawPy, tags: dict[int, Values], path: Path) -> Raw:
         white_balance=_white_balance(file),
         xyz_to_camera=_xyz_to_camera(file, tags),
         camera=dng_tags.camera_name(tags),
-        iso=dng_tags.iso_speed(tags),
+        iso=_iso(file, tags),
         noise=dng_tags.noise_level(tags),
     )
 
@@ -170,6 +202,10 @@ def _white_balance(file: rawpy.RawPy) -> tuple[float, float, float]:
         if min(gains[:3]) > 0:
             return gains[0] / gains[1], 1.0, gains[2] / gains[1]
     return 1.0, 1.0, 1.0
+
+
+def _iso(file: rawpy.RawPy, tags: dict[int, Values]) -> float:
+    return dng_tags.iso_speed(tags) or float(getattr(getattr(file, "other", None), "iso_speed", 0.0))
 
 
 def _xyz_to_camera(file: rawpy.RawPy, tags: dict[int, Values]) -> np.ndarray:

@@ -11,6 +11,7 @@ DNGPrivateData as JSON behind the owner name "FSID"; without that, both greens g
 from __future__ import annotations
 
 import json
+import re
 from fractions import Fraction
 from typing import Any
 
@@ -23,7 +24,7 @@ Tags = dict[int, Values]
 
 MAKE, MODEL, ORIENTATION = 271, 272, 274
 CFA_REPEAT, CFA_PATTERN = 33421, 33422
-EXIF_ISO = 34855
+EXPOSURE_TIME, EXIF_ISO, DATE_TAKEN = 33434, 34855, 36867
 DNG_VERSION, DNG_BACKWARD_VERSION, UNIQUE_CAMERA_MODEL = 50706, 50707, 50708
 CFA_PLANE_COLOUR, CFA_LAYOUT, BLACK_LEVEL, WHITE_LEVEL = 50710, 50711, 50714, 50717
 COLOUR_MATRIX_1, COLOUR_MATRIX_2, AS_SHOT_NEUTRAL, PRIVATE_DATA = 50721, 50722, 50728, 50740
@@ -98,6 +99,18 @@ def iso_speed(tags: Tags) -> float:
     """The ISO that `tags` state, exact where FSID wrote it; 0 where they state none."""
     private = _private_numbers(tags)
     return private[0] if private else _number(tags, EXIF_ISO, 0)
+
+
+def exposure_time_s(tags: Tags) -> float:
+    """Exposure time in seconds; 0 where `tags` state none."""
+    values = _numbers(tags, EXPOSURE_TIME)
+    return values[0] / values[1] if len(values) == 2 and values[1] else 0.0
+
+
+def date_taken(tags: Tags) -> str:
+    """Day on which the picture was taken, "2026-11-21"; "" where `tags` state none."""
+    day = _text(tags, DATE_TAKEN)[:10].replace(":", "-")
+    return day if re.fullmatch(r"\d{4}-\d\d-\d\d", day) else ""
 
 
 def d65_matrix(tags: Tags) -> np.ndarray | None:

@@ -3,8 +3,8 @@
     frame or photo -> camera RGB in 0..1 -> mosaic = clean,     noisy = Q(clean + sqrt(k clean + s2) n)
 
 Q rounds and clips like the camera, and s2 is sigma2 without what Q adds: Var(noisy) = k clean + sigma2.
-Colour, exposure and noise are drawn here, from the generator that the caller gives. The clean image is neither
-rounded nor noisy.
+Colour, exposure and noise are drawn here, from the generator that the caller gives. The clean image is
+neither rounded nor noisy.
 """
 
 from __future__ import annotations

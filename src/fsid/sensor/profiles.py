@@ -4,14 +4,13 @@
 
 A profile is one YAML file: the camera's integers (CFA, bits, black and white level) and a list of levels,
 each with `iso`, `k`, `sigma2` (normalised) and the same in DN (`k_dn = k span`, `sigma2_dn = sigma2 span^2`;
-a file written by hand may leave these two out), four values per entry in the order R, Gr, Gb, B. The values
-stand there as measured; `iso_law` turns them into a physical level at any ISO. Own profiles work by path.
+a file written by hand may leave these two out), four values per entry in the order R, Gr, Gb, B. A calibrated
+one states errors, black level and number of frames beside them, and `law`, the line and the parabola through
+all ISOs, which is there to be read by people: FSID computes it again. Own profiles work by path.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
 from importlib.resources import files
 from itertools import pairwise
 from pathlib import Path
@@ -19,58 +18,19 @@ from typing import Any
 
 import numpy as np
 import yaml
+from numpy.polynomial.polynomial import polyval
 
 from fsid.errors import FsidError
+from fsid.sensor.camera_profile import MONO, CameraProfile, Measurement
 from fsid.sensor.colour import published_matrices
-from fsid.sensor.iso_law import IsoCurve, k_curve, sigma2_curve
+from fsid.sensor.iso_law import k_law, sigma2_law
 from fsid.sensor.mosaic import check_cfa
 from fsid.sensor.quantise import ROUNDING_DN2
-from fsid.sensor.raw import NoiseLevel
 
 _REQUIRED = {"name", "camera", "cfa", "bits", "black_level", "white_level", "levels"}
-_OPTIONAL = {"source", "notes", "xyz_to_camera"}
+_OPTIONAL = {"source", "notes", "date", "xyz_to_camera", "law"}
+_MEASURED = {"k_error", "sigma2_error", "black", "frames", "dark_frames"}
 _DN_TOLERANCE = 0.01  # k_dn and sigma2_dn repeat k and sigma2; they may differ by rounding only
-
-
-@dataclass(frozen=True)
-class CameraProfile:
-    """What FSID knows of one camera.
-
-    black_level, white_level: DN; bits: of the stored integer. iso: (n,) ascending. k, sigma2: (n, 4) float64,
-    sites R, Gr, Gb, B, normalised units, as measured or published; sigma2 may be impossible here, but not in
-    what `level` returns.
-    xyz_to_camera: (m, 3, 3) matrices for D65 (DNG `ColorMatrix1`); `colour.colour_rand` blends them.
-    """
-
-    name: str
-    camera: str
-    cfa: str
-    black_level: int
-    white_level: int
-    bits: int
-    iso: tuple[float, ...]
-    k: np.ndarray
-    sigma2: np.ndarray
-    xyz_to_camera: np.ndarray
-    source: str = ""
-    notes: str = ""
-
-    @property
-    def span(self) -> int:
-        """DN from black to white."""
-        return self.white_level - self.black_level
-
-    def level(self, iso: float) -> NoiseLevel:
-        """Noise at any ISO > 0, monotone and continuous in ISO; see `iso_law` for what is believed where."""
-        if not (np.isfinite(iso) and iso > 0):
-            raise FsidError(f"profile {self.name}: ISO {iso} is not a positive number")
-        k, sigma2 = self._curves
-        return NoiseLevel(k=_four(k(iso)), sigma2=_four(sigma2(iso)))
-
-    @cached_property
-    def _curves(self) -> tuple[IsoCurve, IsoCurve]:
-        iso, floor = np.array(self.iso), ROUNDING_DN2 / self.span**2
-        return k_curve(iso, self.k), sigma2_curve(iso, self.sigma2, floor)
 
 
 def profile_names() -> tuple[str, ...]:
@@ -90,19 +50,12 @@ def load_profile(name_or_path: str | Path) -> CameraProfile:
 
 def save_profile(path: str | Path, profile: CameraProfile) -> None:
     """Write `profile` as the YAML that `load_profile` reads (whole or not at all), numbers to 6 digits."""
-    levels = [
-        {
-            "iso": iso,
-            "k": _rounded(k),
-            "sigma2": _rounded(sigma2),
-            "k_dn": _rounded(k * profile.span),
-            "sigma2_dn": _rounded(sigma2 * profile.span**2),
-        }
-        for iso, k, sigma2 in zip(profile.iso, profile.k, profile.sigma2, strict=True)
-    ]
-    keys = ("name", "camera", "cfa", "bits", "black_level", "white_level", "source", "notes")
+    keys = ("name", "camera", "cfa", "bits", "black_level", "white_level", "date", "source", "notes")
     data = {key: getattr(profile, key) for key in keys}
-    data |= {"xyz_to_camera": profile.xyz_to_camera.tolist(), "levels": levels}
+    data |= {"xyz_to_camera": profile.xyz_to_camera.tolist()}
+    if profile.measured is not None and len(profile.iso) > 1:
+        data["law"] = _law(profile)
+    data["levels"] = [_level(profile, row) for row in range(len(profile.iso))]
     path = Path(path)
     part = path.with_name(path.name + ".part")
     try:
@@ -111,6 +64,46 @@ def save_profile(path: str | Path, profile: CameraProfile) -> None:
     except OSError as error:
         part.unlink(missing_ok=True)
         raise FsidError(f"{path}: cannot write this profile: {error.strerror}") from error
+
+
+def _level(profile: CameraProfile, row: int) -> dict[str, Any]:
+    k, sigma2, span = profile.k[row], profile.sigma2[row], profile.span
+    level = {
+        "iso": profile.iso[row],
+        "k": _rounded(k),
+        "sigma2": _rounded(sigma2),
+        "k_dn": _rounded(k * span),
+        "sigma2_dn": _rounded(sigma2 * span**2),
+    }
+    if (measured := profile.measured) is not None:
+        level |= {
+            "k_error": _rounded(measured.k_error[row]),
+            "sigma2_error": _rounded(measured.sigma2_error[row]),
+            "black": _rounded(measured.black[row]),
+            "frames": measured.frames[row],
+            "dark_frames": measured.dark_frames[row],
+        }
+    return level
+
+
+def _law(profile: CameraProfile) -> dict[str, Any]:
+    """Coefficients per site in ascending order of ISO, and the largest relative departure of a level."""
+    iso, floor = np.array(profile.iso), ROUNDING_DN2 / profile.span**2
+    k = [k_law(iso, site) for site in profile.k.T]
+    sigma2 = [sigma2_law(iso, site, floor, 0.0) for site in profile.sigma2.T]
+    for coefficients in sigma2:
+        coefficients[0] += floor
+    return {
+        "k": [_rounded(c) for c in k],
+        "sigma2": [_rounded(c) for c in sigma2],
+        "k_departure": _departure(iso, k, profile.k),
+        "sigma2_departure": _departure(iso, sigma2, profile.sigma2),
+    }
+
+
+def _departure(iso: np.ndarray, coefficients: list[np.ndarray], values: np.ndarray) -> float:
+    law = np.stack([polyval(iso, c) for c in coefficients], axis=1)
+    return float(f"{np.max(np.abs(values / law - 1)):.3g}")
 
 
 def _rounded(values: np.ndarray) -> list[float]:
@@ -140,10 +133,11 @@ def _parse(text: str, where: str) -> CameraProfile:
     if white >= 2**bits:
         raise FsidError(f"{where}: white_level {white} does not fit into {bits} bits")
     iso, k, sigma2 = _levels(data["levels"], where, white - black)
+    cfa = data["cfa"] if data["cfa"] == MONO else check_cfa(data["cfa"], f"{where}: cfa")
     return CameraProfile(
         name=str(data["name"]),
         camera=str(data["camera"]),
-        cfa=check_cfa(data["cfa"], f"{where}: cfa"),
+        cfa=cfa,
         black_level=black,
         white_level=white,
         bits=bits,
@@ -153,6 +147,8 @@ def _parse(text: str, where: str) -> CameraProfile:
         xyz_to_camera=_matrices(data, where),
         source=str(data.get("source", "")),
         notes=str(data.get("notes", "")),
+        date=str(data.get("date", "")),
+        measured=_measurement(data["levels"], where),
     )
 
 
@@ -162,7 +158,7 @@ def _levels(entries: Any, where: str, span: int) -> tuple[tuple[float, ...], np.
     iso, k, sigma2 = [], [], []
     for number, entry in enumerate(entries):
         here = f"{where}: levels[{number}]"
-        _check_keys(entry, here, {"iso", "k", "sigma2"}, {"k_dn", "sigma2_dn"})
+        _check_keys(entry, here, {"iso", "k", "sigma2"}, {"k_dn", "sigma2_dn"} | _MEASURED)
         iso.append(_number(entry["iso"], f"{here}.iso"))
         k.append(_site_values(entry, "k", here, span))
         sigma2.append(_site_values(entry, "sigma2", here, span**2))
@@ -171,6 +167,22 @@ def _levels(entries: Any, where: str, span: int) -> tuple[tuple[float, ...], np.
     if iso[0] <= 0 or any(b <= a for a, b in pairwise(iso)):
         raise FsidError(f"{where}: levels must be in order of rising, positive iso; got {iso}")
     return tuple(iso), np.array(k), np.array(sigma2)
+
+
+def _measurement(entries: list[dict[str, Any]], where: str) -> Measurement | None:
+    if not any(_MEASURED & entry.keys() for entry in entries):
+        return None
+    table: dict[str, list[Any]] = {key: [] for key in _MEASURED}
+    for number, entry in enumerate(entries):
+        here = f"{where}: levels[{number}]"
+        if missing := _MEASURED - entry.keys():
+            raise FsidError(f"{here}: missing key {', '.join(sorted(missing))}; a calibrated level has all")
+        for key in ("k_error", "sigma2_error", "black"):
+            table[key].append(_four_numbers(entry[key], f"{here}.{key}"))
+        for key in ("frames", "dark_frames"):
+            table[key].append(int(_number(entry[key], f"{here}.{key}")))
+    arrays = {key: np.array(table[key]) for key in ("k_error", "sigma2_error", "black")}
+    return Measurement(**arrays, frames=tuple(table["frames"]), dark_frames=tuple(table["dark_frames"]))
 
 
 def _site_values(entry: dict[str, Any], key: str, where: str, unit: float) -> list[float]:
@@ -224,8 +236,3 @@ def _four_numbers(values: Any, where: str) -> list[float]:
     if not isinstance(values, list) or len(values) != 4:
         raise FsidError(f"{where} must list four numbers, for the sites R, Gr, Gb, B; got {values!r}")
     return [_number(value, where) for value in values]
-
-
-def _four(values: np.ndarray) -> tuple[float, float, float, float]:
-    a, b, c, d = (float(v) for v in values)
-    return a, b, c, d

@@ -24,7 +24,9 @@ SIGNIFICANT = 5.0  # standard errors: of 64 blocks in 1,000 frames none deviates
 LARGEST_FLICKER = 0.1  # of the light; beyond it this is another exposure, and its noise another noise
 MOVED_SHARE = 0.25  # of the blocks, from which on the burst shows no static scene
 CONTAMINATION = 0.1  # of a pixel's noise variance, from which on a changed block spoils the fit
+LARGEST_CORRELATION = 0.1  # between the changes of neighbours; noise has none
 _GRID = 8
+_THINNING = 4
 _MIN_BLOCK_SIDE_PX = 8
 _MIN_BLOCKS = 4  # to tell gain from offset
 _MAX_CLIPPED_SHARE = 0.01  # of a block that still tells the light
@@ -74,6 +76,7 @@ class TemporalStatistics:
             if (gain, offset) != (1.0, 0.0):
                 change += self._first * (1 - gain) - offset
                 change /= gain
+            _check_white(np.where(self._clipped, 0.0, np.sign(change)), name)
             if self._dark:
                 self._count_noise(change)
             self.gains.append(gain)
@@ -110,6 +113,18 @@ class TemporalStatistics:
     def moved_share(self) -> float:
         """Share of the blocks in which something moved."""
         return float(self._moved.mean())
+
+    @property
+    def level_dn(self) -> float:
+        """Mean of the first frame."""
+        self._check()
+        return float(self._reference.mean())
+
+    @property
+    def contrast_dn(self) -> float:
+        """Difference between the lightest and the darkest block of the first frame."""
+        self._check()
+        return float(np.ptp(self._reference))
 
     def read_statistics(self) -> ReadStatistics:
         """What the noise is made of; for bursts of dark frames."""
@@ -152,15 +167,15 @@ class TemporalStatistics:
             return 1.0, 0.0
         weight = pixels / np.maximum(noise[usable], 1 / 12)
         gain, offset = _gain_and_offset(means[usable], self._reference[usable], weight)
+        left = means - (gain - 1) * self._reference - offset
+        error2 = np.maximum(noise, 1 / 12) / pixels
+        spoils = left**2 > CONTAMINATION * np.maximum(noise, 1 / 12) / 2
+        self._exclude(usable & spoils & (left**2 > SIGNIFICANT**2 * error2), name)
         if abs(gain - 1) > LARGEST_FLICKER:
             raise FsidError(
                 f"{name}: its light differs by {100 * (gain - 1):+.0f} % from the first frame of the burst; "
                 f"use steady light, or leave it out"
             )
-        left = means - (gain - 1) * self._reference - offset
-        error2 = np.maximum(noise, 1 / 12) / pixels
-        spoils = left**2 > CONTAMINATION * np.maximum(noise, 1 / 12) / 2
-        self._exclude(usable & spoils & (left**2 > SIGNIFICANT**2 * error2), name)
         return gain, offset
 
     def _exclude(self, moved: np.ndarray, name: str) -> None:
@@ -183,6 +198,24 @@ class TemporalStatistics:
         squares *= squares
         fourth = float(squares.mean())
         self._noise += (pixel, fourth, rows.var() - pixel / width, columns.var() - pixel / height)
+
+
+def _check_white(sign: np.ndarray, name: str) -> None:
+    """FsidError where the sign of a pixel's change tells that of its next neighbour of the same colour.
+
+    Noise is white, and banding is only along rows or columns; a picture that shifts is correlated both ways.
+    The sign, because one moving object, which `_exclude` deals with, must not decide for the whole picture.
+    """
+    across, down = sign[::_THINNING], sign[:, ::_THINNING].T
+    count = min(across.size, down.size)
+    if count < _MIN_BLOCK_SIDE_PX**2 or min(sign.shape) < 3:
+        return
+    found = [float(np.mean(c[:, 2:] * c[:, :-2]) / max(np.mean(c * c), 1e-6)) for c in (across, down)]
+    if min(found) > max(LARGEST_CORRELATION, 2 * SIGNIFICANT / np.sqrt(count)):
+        raise FsidError(
+            f"{name}: it is shifted against the first frame of the burst, the camera or the scene moved; "
+            f"use a tripod and a static scene"
+        )
 
 
 def _gain_and_offset(change: np.ndarray, reference: np.ndarray, weight: np.ndarray) -> tuple[float, float]:

@@ -1,0 +1,215 @@
+"""From frames on disk to the noise profile of their camera: the whole calibration.
+
+    per ISO:  dark frames -> black, sigma2;   bursts -> (mean, variance) of every pixel -> line per site
+    k = k_dn / span,      sigma2 = sigma2_dn / span^2,      span = white - black
+
+Only one burst is in memory at a time, as sums; what remains of it is some hundred pooled samples. Dark frames
+of the shortest exposure give the black level, and those of longer ones lie on the same line: dark current is
+light to the noise. What was found and left out on the way is said in `Calibration.notes`, one line each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from fsid.errors import FsidError
+from fsid.sensor.calibrate import NoiseFit, Samples, black_of, fit_samples, pool
+from fsid.sensor.camera_profile import MONO, CameraProfile, Measurement
+from fsid.sensor.colour import published_matrices
+from fsid.sensor.frames import Frame, FrameSet, Layout, bursts, find_frames
+from fsid.sensor.temporal import TemporalStatistics
+
+MIN_FRAMES = 3  # of one ISO; a variance from two is one number per pixel, and a defect looks like noise
+DARK_LEVEL = 0.05  # of the range, above which a dark frame saw light
+DARK_CONTRAST = 0.02  # of the range between blocks, above which a dark frame shows a picture
+UNCERTAIN = 0.02  # relative standard error of k that deserves a note
+_METHOD = "fsid calibrate: weighted line through pooled temporal variances per CFA site (sensor/calibrate.py)"
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """A profile, the lines it is made of (one per ISO of the profile), and notes for the user."""
+
+    profile: CameraProfile
+    fits: tuple[NoiseFit, ...]
+    notes: tuple[str, ...]
+
+
+def calibrate(
+    paths: Sequence[Path],
+    *,
+    name: str,
+    dark: Sequence[Path] = (),
+    layout: Layout = Layout(),
+    camera: str | None = None,
+    tie_greens: bool = False,
+    progress: Progress | None = None,
+) -> Calibration:
+    """Noise profile `name` of a camera from bursts of static scenes, `paths`, and of the covered lens.
+
+    layout: what bare mosaics do not say. camera: name for the profile, else the files'. tie_greens: one
+    line for Gr and Gb. FsidError: mixed cameras, lone frames, moving scene, saturated or too few frames,
+    dark frames that are not dark.
+    """
+    found = find_frames(paths, dark, layout)
+    isos = sorted({frame.iso for frame in found.frames})
+    reader = _Reader(found, layout, progress)
+    fits = [_fit_iso(reader, iso, tie_greens) for iso in isos]
+    profile = _profile(found, isos, fits, name, camera)
+    return Calibration(profile, tuple(fits), (*found.notes, *_notes(reader, isos, fits)))
+
+
+class _Reader:
+    """Streams bursts, counts the frames for the progress bar, and keeps what is worth a note."""
+
+    def __init__(self, found: FrameSet, layout: Layout, progress: Progress | None) -> None:
+        self.found, self._layout, self._progress = found, layout, progress
+        self.drifts_dn: list[float] = []  # of bursts that drifted
+        self.moved: list[Path] = []
+        self.saturated: list[Path] = []
+        self._done, self._total = 0, len(found.frames) + len(found.dark)
+
+    def statistics(self, burst: Sequence[Frame], *, dark: bool = False) -> TemporalStatistics:
+        if len(burst) < 2:
+            raise FsidError(
+                f"{burst[0].path}: the only frame of its ISO and exposure; a burst needs the same picture "
+                f"several times: add frames or leave it out"
+            )
+        stats = TemporalStatistics(self.found.camera.white_level, dark=dark)
+        for frame in burst:
+            stats.add(self.found.read(frame, self._layout), str(frame.path))
+            self._done += 1
+            if self._progress is not None:
+                self._progress(self._done, self._total)
+        levels = [
+            offset + (gain - 1) * stats.level_dn
+            for gain, offset in zip(stats.gains, stats.offsets_dn, strict=True)
+        ]
+        if any(levels):
+            self.drifts_dn.append(max(map(abs, levels)))
+        if stats.moved_share > 0:
+            self.moved.append(burst[0].path)
+        return stats
+
+
+def _fit_iso(reader: _Reader, iso: float, tie_greens: bool) -> NoiseFit:
+    camera = reader.found.camera
+    lights = [frame for frame in reader.found.frames if frame.iso == iso]
+    darks = [frame for frame in reader.found.dark if frame.iso == iso]
+    if len(lights) + len(darks) < MIN_FRAMES:
+        raise FsidError(
+            f"{lights[0].path}: only {len(lights) + len(darks)} frames of ISO {iso:g}; a calibration needs "
+            f"at least {MIN_FRAMES}, and 20 or more to be good"
+        )
+    black = None if camera.black_level is None else _per_site(camera.black_level, camera.cfa)
+    pooled: list[tuple[Samples, ...]] = []
+    for number, burst in enumerate(bursts(darks)):
+        stats = reader.statistics(burst, dark=True)
+        _check_dark(stats, burst[0].path, camera.black_level, camera.white_level)
+        if number == 0:
+            black = black_of(stats, camera.cfa)
+        assert black is not None
+        pooled.append(pool(stats, camera.cfa, black, camera.white_level))
+    if black is None:
+        raise FsidError(
+            f"{lights[0].path}: ISO {iso:g} has no dark frames and no black level; "
+            f"give --dark frames or --black-level"
+        )
+    usable = False
+    for burst in bursts(lights):
+        stats = reader.statistics(burst)
+        try:
+            samples = pool(stats, camera.cfa, black, camera.white_level)
+        except FsidError as error:
+            raise FsidError(f"{burst[0].path}: {error}") from error
+        if all(site.used.any() for site in samples):
+            usable = True
+        else:
+            reader.saturated.append(burst[0].path)
+        pooled.append(samples)
+    if not usable:
+        raise FsidError(
+            f"{lights[0].path}: every burst of ISO {iso:g} is saturated or without light; "
+            f"expose so that the scene stays below 70 % of the range"
+        )
+    try:
+        return fit_samples(pooled, black, tie_greens=tie_greens)
+    except FsidError as error:
+        raise FsidError(f"{lights[0].path}: ISO {iso:g}: {error}") from error
+
+
+def _check_dark(stats: TemporalStatistics, path: Path, black: int | None, white: int) -> None:
+    level = float(np.median(stats.mean()))
+    floor, limit = (black, DARK_LEVEL) if black is not None else (0, 5 * DARK_LEVEL)
+    if level - floor > limit * (white - floor):
+        raise FsidError(f"{path}: a dark frame of mean {level:.0f} DN is not dark; cover the lens")
+    if stats.contrast_dn > DARK_CONTRAST * white:
+        raise FsidError(f"{path}: a dark frame that shows a picture is not dark; cover the lens")
+
+
+def _notes(reader: _Reader, isos: Sequence[float], fits: Sequence[NoiseFit]) -> Iterator[str]:
+    if unmatched := {frame.iso for frame in reader.found.dark} - set(isos):
+        yield f"dark frames of ISO {', '.join(f'{i:g}' for i in sorted(unmatched))} have no bursts: unused"
+    if reader.drifts_dn:
+        yield (
+            f"the level of {len(reader.drifts_dn)} bursts drifted by up to {max(reader.drifts_dn):.2g} DN "
+            f"between frames (flicker, black level): compensated"
+        )
+    for paths, what in (
+        (reader.moved, "something moved; that part of the image is left out"),
+        (reader.saturated, "beyond 70 % of the range or without light; left out"),
+    ):
+        if paths:
+            yield f"{len(paths)} bursts, the first one that of {paths[0]}: {what}"
+    for iso, fit in zip(isos, fits, strict=True):
+        if (error := float(np.max(fit.k_dn_error / fit.k_dn))) > UNCERTAIN:
+            yield f"ISO {iso:g}: k is uncertain by {100 * error:.1f} %; take more frames"
+
+
+def _profile(
+    found: FrameSet, isos: Sequence[float], fits: Sequence[NoiseFit], name: str, camera: str | None
+) -> CameraProfile:
+    seen = found.camera
+    black = seen.black_level
+    if black is None:
+        black = round(float(np.mean([fit.black for fit in fits])))
+    span = seen.white_level - black
+    frames, dark = (
+        tuple(sum(frame.iso == iso for frame in group) for iso in isos)
+        for group in (found.frames, found.dark)
+    )
+
+    def table(values: list[np.ndarray]) -> np.ndarray:
+        return np.array([np.broadcast_to(v, 4) for v in values])
+
+    return CameraProfile(
+        name=name,
+        camera=camera or seen.name or "unknown",
+        cfa=seen.cfa or MONO,
+        black_level=black,
+        white_level=seen.white_level,
+        bits=seen.white_level.bit_length(),
+        iso=tuple(isos),
+        k=table([fit.k_dn for fit in fits]) / span,
+        sigma2=table([fit.sigma2_dn for fit in fits]) / span**2,
+        xyz_to_camera=published_matrices(),
+        source=_METHOD,
+        date=found.date,
+        measured=Measurement(
+            k_error=table([fit.k_dn_error for fit in fits]) / span,
+            sigma2_error=table([fit.sigma2_dn_error for fit in fits]) / span**2,
+            black=table([fit.black for fit in fits]),
+            frames=frames,
+            dark_frames=dark,
+        ),
+    )
+
+
+def _per_site(black: float, cfa: str | None) -> np.ndarray:
+    return np.full(1 if cfa is None else 4, float(black))

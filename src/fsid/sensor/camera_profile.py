@@ -1,0 +1,82 @@
+"""What FSID knows of one camera, in memory; `profiles` reads and writes it.
+
+    Var(x) = k x + sigma2,      x = (DN - black) / span,      span = white - black
+
+k and sigma2 stand here as they were measured or published; `iso_law` turns them into a physical level at
+any ISO. sigma2 is the variance of stored data: the 1/12 DN^2 of rounding is a part of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from fsid.errors import FsidError
+from fsid.sensor.iso_law import IsoCurve, k_curve, sigma2_curve
+from fsid.sensor.quantise import ROUNDING_DN2
+from fsid.sensor.raw import NoiseLevel
+
+MONO = "MONO"  # stands in `cfa` for a sensor without colour filters; its four sites are alike
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """How sure the levels are, one row per ISO: standard errors (n, 4), black level (n, 4) in DN, frames."""
+
+    k_error: np.ndarray
+    sigma2_error: np.ndarray
+    black: np.ndarray
+    frames: tuple[int, ...]
+    dark_frames: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class CameraProfile:
+    """One camera.
+
+    cfa: Bayer pattern, or "MONO". black_level, white_level: DN; bits: of the stored integer. iso: (n,)
+    ascending. k, sigma2: (n, 4) float64, sites R, Gr, Gb, B, normalised units, as measured or published;
+    sigma2 may be impossible here, but not in what `level` returns.
+    xyz_to_camera: (m, 3, 3) matrices for D65 (DNG `ColorMatrix1`); `colour.colour_rand` blends them.
+    date: of the data. measured: None where the source states no errors.
+    """
+
+    name: str
+    camera: str
+    cfa: str
+    black_level: int
+    white_level: int
+    bits: int
+    iso: tuple[float, ...]
+    k: np.ndarray
+    sigma2: np.ndarray
+    xyz_to_camera: np.ndarray
+    source: str = ""
+    notes: str = ""
+    date: str = ""
+    measured: Measurement | None = None
+
+    @property
+    def span(self) -> int:
+        """DN from black to white."""
+        return self.white_level - self.black_level
+
+    def level(self, iso: float) -> NoiseLevel:
+        """Noise at any ISO > 0, monotone and continuous in ISO; see `iso_law` for what is believed where."""
+        if not (np.isfinite(iso) and iso > 0):
+            raise FsidError(f"profile {self.name}: ISO {iso} is not a positive number")
+        k, sigma2 = self.curves
+        return NoiseLevel(k=_four(k(iso)), sigma2=_four(sigma2(iso)))
+
+    @cached_property
+    def curves(self) -> tuple[IsoCurve, IsoCurve]:
+        """k and sigma2 over ISO."""
+        iso, floor = np.array(self.iso), ROUNDING_DN2 / self.span**2
+        return k_curve(iso, self.k), sigma2_curve(iso, self.sigma2, floor)
+
+
+def _four(values: np.ndarray) -> tuple[float, float, float, float]:
+    a, b, c, d = (float(v) for v in values)
+    return a, b, c, d

@@ -1,0 +1,104 @@
+"""The picture of a calibration: what was measured, the line through it, and what is left over.
+
+Per ISO a column: variance over signal with the line, and the residuals in percent of the line. Open symbols
+are measured but not used: beyond 70 % of the range (shaded), or below the resolution of the converter. A
+last column shows k and sigma2 over ISO with the profile's law, where there are several ISOs.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from fsid.errors import FsidError
+from fsid.sensor.calibrate import LINEAR_SHARE, NoiseFit
+from fsid.sensor.camera_fit import Calibration
+from fsid.sensor.camera_profile import MONO, CameraProfile
+from fsid.sensor.mosaic import SITES
+
+COLOURS = ("tab:red", "tab:green", "tab:olive", "tab:blue")
+_MAX_COLUMNS = 4  # ISOs in one picture; of more, evenly chosen ones
+
+
+def plot_calibration(path: Path, calibration: Calibration) -> None:
+    """Write the picture to `path` (.png, .pdf or .svg)."""
+    profile, fits = calibration.profile, calibration.fits
+    chosen = np.unique(np.linspace(0, len(fits) - 1, min(len(fits), _MAX_COLUMNS)).round().astype(int))
+    laws = len(fits) > 1
+    figure = Figure(figsize=(4.6 * (len(chosen) + laws), 7), layout="constrained")
+    axes = figure.subplots(2, len(chosen) + laws, squeeze=False)
+    for column, index in enumerate(chosen):
+        _plot_fit(axes[0, column], axes[1, column], fits[index], profile, profile.iso[index])
+    if laws:
+        plot_levels(axes[0, -1], axes[1, -1], profile)
+    figure.suptitle(f"{profile.camera}: Var = k (DN - black) + sigma2")
+    save_figure(path, figure)
+
+
+def plot_profile(path: Path, profile: CameraProfile) -> None:
+    """Write the picture of k and sigma2 over ISO to `path` (.png, .pdf or .svg)."""
+    figure = Figure(figsize=(11, 4.5), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    plot_levels(left, right, profile)
+    figure.suptitle(profile.camera)
+    save_figure(path, figure)
+
+
+def plot_levels(k_axes: Axes, sigma2_axes: Axes, profile: CameraProfile) -> None:
+    """k and sigma2 over ISO: the table of the profile as symbols, what `level` makes of it as lines."""
+    iso = np.geomspace(min(profile.iso) / 1.4, max(profile.iso) * 2, 200)
+    levels = [profile.level(value) for value in iso]
+    none = np.full_like(profile.k, np.nan)
+    measured = profile.measured
+    k_error, sigma2_error = (none, none) if measured is None else (measured.k_error, measured.sigma2_error)
+    tables = (
+        (k_axes, "k", profile.k, k_error, [level.k for level in levels]),
+        (sigma2_axes, "sigma2", profile.sigma2, sigma2_error, [level.sigma2 for level in levels]),
+    )
+    for axes, name, table, error, curve in tables:
+        for site, (label, colour) in enumerate(_sites(profile)):
+            axes.plot(iso, np.array(curve)[:, site], color=colour, linewidth=1)
+            axes.errorbar(
+                profile.iso, table[:, site], error[:, site], fmt="o", ms=4, color=colour, label=label
+            )
+        axes.set(xscale="log", yscale="log", xlabel="ISO", title=f"{name} (normalised) over ISO")
+        axes.legend(fontsize="small")
+        axes.grid(alpha=0.3)
+
+
+def save_figure(path: Path, figure: Figure) -> None:
+    """Write `figure`; FsidError where the folder is not there or the suffix is no picture's."""
+    try:
+        figure.savefig(path, dpi=110)
+    except (OSError, ValueError) as error:
+        path.unlink(missing_ok=True)
+        raise FsidError(f"{path}: cannot write this plot: {error}") from error
+
+
+def _plot_fit(top: Axes, bottom: Axes, fit: NoiseFit, profile: CameraProfile, iso: float) -> None:
+    limit = LINEAR_SHARE * profile.span
+    for site, (samples, (label, colour)) in enumerate(zip(fit.samples, _sites(profile), strict=False)):
+        line = fit.k_dn[site] * samples.signal + fit.sigma2_dn[site]
+        text = f"{label}: k {fit.k_dn[site]:.4g}, sigma2 {fit.sigma2_dn[site]:.4g} DN^2"
+        residual = 100 * (samples.variance / line - 1)
+        for used, fill, name in ((samples.used, colour, text), (~samples.used, "none", None)):
+            for axes, values in ((top, samples.variance), (bottom, residual)):
+                axes.plot(samples.signal[used], values[used], "o", ms=3, color=colour, mfc=fill, label=name)
+        order = np.argsort(samples.signal)
+        top.plot(samples.signal[order], line[order], color=colour, linewidth=1)
+    for axes in (top, bottom):
+        axes.axvspan(limit, profile.span, color="0.9", zorder=0)
+        axes.set_xlim(-0.02 * profile.span, profile.span)
+        axes.grid(alpha=0.3)
+    largest = max((np.max(np.abs(s.variance[s.used])) for s in fit.samples if s.used.any()), default=1.0)
+    top.set(ylim=(0, 1.6 * largest), ylabel="variance (DN^2)", title=f"ISO {iso:g}")
+    top.legend(fontsize="x-small", loc="upper left")
+    bottom.axhline(0, color="0.3", linewidth=0.8)
+    bottom.set(ylim=(-15, 15), ylabel="residual (%)", xlabel="signal above black (DN)")
+
+
+def _sites(profile: CameraProfile) -> tuple[tuple[str, str], ...]:
+    return (("mono", "0.3"),) if profile.cfa == MONO else tuple(zip(SITES, COLOURS, strict=True))

@@ -1,0 +1,197 @@
+"""Frames on disk, sorted into bursts: same ISO, same exposure, same light.
+
+RAW files say their ISO and exposure time. Bare mosaics (.npy, .png, .tif, .raw) say nothing: their ISO is
+what the caller gives, or what their path says ("iso3200/a.png", "dark_ISO800_3.npy"), and consecutive files
+whose mean level agrees within 3 % are one burst. Frames are opened one by one and never kept.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from pathlib import Path
+
+import numpy as np
+
+from fsid.errors import FsidError
+from fsid.sensor.bare import BARE_SUFFIXES, read_dn
+from fsid.sensor.dng import RawHeader, read_header, read_raw
+from fsid.sensor.mosaic import check_cfa
+from fsid.sensor.quantise import check_levels, to_dn
+
+SAME_LIGHT = 0.03  # relative difference of the levels of two frames of one burst
+_ISO_IN_PATH = re.compile(r"iso[-_ ]?(\d+)", re.IGNORECASE)
+_SITES_DIFFER = 0.02  # of the level: a flat grey through colour filters differs by far more
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What bare mosaics do not say; None where it must be found. cfa "MONO" for no colour filters."""
+
+    iso: float | None = None
+    cfa: str | None = None
+    black_level: int | None = None
+    white_level: int | None = None
+    width: int | None = None
+    height: int | None = None
+
+
+@dataclass(frozen=True)
+class Camera:
+    """What all frames of a calibration share. cfa: None without filters. black_level: None where unknown."""
+
+    name: str
+    cfa: str | None
+    black_level: int | None
+    white_level: int
+    bare: bool
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A frame on disk. iso and exposure_s: 0 where unknown. level: mean DN of a bare mosaic, else 0."""
+
+    path: Path
+    iso: float
+    exposure_s: float
+    level: float
+
+
+@dataclass(frozen=True)
+class FrameSet:
+    """The frames and dark frames of one camera. date: of the first frame, "" where unknown."""
+
+    camera: Camera
+    frames: tuple[Frame, ...]
+    dark: tuple[Frame, ...]
+    date: str
+    notes: tuple[str, ...]
+
+    def read(self, frame: Frame, layout: Layout) -> np.ndarray:
+        """DN (H, W) of `frame`; FsidError where it is of another camera or another mode."""
+        if self.camera.bare:
+            return read_dn(frame.path, cfa=self.camera.cfa, width=layout.width, height=layout.height)
+        raw = read_raw(frame.path)
+        found = (raw.cfa, raw.black_level, raw.white_level)
+        expected = (self.camera.cfa, self.camera.black_level, self.camera.white_level)
+        if found != expected:
+            raise FsidError(
+                f"{frame.path}: CFA, black and white level are {found}, those of the first frame {expected}; "
+                f"give frames of one camera in one mode"
+            )
+        return to_dn(raw)
+
+
+def find_frames(
+    paths: Sequence[Path],
+    dark: Sequence[Path],
+    layout: Layout,
+    progress: Callable[[int, int], None] | None = None,
+) -> FrameSet:
+    """Look at every file once: RAW headers, and the level and maximum of bare mosaics."""
+    paths, dark = _files(paths), _files(dark)
+    if not paths:
+        raise FsidError("calibration needs the frames of at least one burst")
+    bare = paths[0].suffix.lower() in BARE_SUFFIXES
+    for path in (*paths, *dark):
+        if (path.suffix.lower() in BARE_SUFFIXES) != bare:
+            raise FsidError(f"{path}: RAW files and bare mosaics in one calibration; give frames of one kind")
+    if bare:
+        return _bare_frames(paths, dark, layout, progress)
+    return _raw_frames(paths, dark, layout)
+
+
+def bursts(frames: Sequence[Frame]) -> list[tuple[Frame, ...]]:
+    """`frames` of one ISO, by exposure time and, for bare mosaics, by level in the given order."""
+    found: list[list[Frame]] = []
+    for _, same in groupby(sorted(frames, key=lambda f: f.exposure_s), key=lambda f: f.exposure_s):
+        found.append([])
+        for frame in same:
+            if found[-1] and abs(frame.level - found[-1][0].level) > SAME_LIGHT * found[-1][0].level:
+                found.append([])
+            found[-1].append(frame)
+    return [tuple(burst) for burst in found]
+
+
+def _files(paths: Sequence[Path]) -> list[Path]:
+    """`paths` with folders replaced by their files."""
+    files: list[Path] = []
+    for path in paths:
+        if not path.exists():
+            raise FsidError(f"{path}: no such frame")
+        files += sorted(p for p in path.iterdir() if p.is_file()) if path.is_dir() else [path]
+    return files
+
+
+def _raw_frames(paths: Sequence[Path], dark: Sequence[Path], layout: Layout) -> FrameSet:
+    first = read_raw(paths[0])
+    headers = {path: read_header(path) for path in (*paths, *dark)}
+    for path, header in headers.items():
+        if header.camera != first.camera:
+            raise FsidError(
+                f"{path}: is from camera {header.camera!r}, the first frame from {first.camera!r}; "
+                f"calibrate one camera at a time"
+            )
+    camera = Camera(first.camera, first.cfa, first.black_level, first.white_level, bare=False)
+    if layout.cfa is not None or layout.black_level is not None or layout.white_level is not None:
+        raise FsidError(f"{paths[0]}: a RAW file states its CFA and levels itself; leave the options out")
+
+    def frame(path: Path) -> Frame:
+        header: RawHeader = headers[path]
+        return Frame(path, header.iso or _iso(path, layout), header.exposure_s, 0.0)
+
+    sets = tuple(frame(path) for path in paths), tuple(frame(path) for path in dark)
+    return FrameSet(camera, *sets, headers[paths[0]].date, ())
+
+
+def _bare_frames(
+    paths: Sequence[Path],
+    dark: Sequence[Path],
+    layout: Layout,
+    progress: Callable[[int, int], None] | None,
+) -> FrameSet:
+    cfa = None if layout.cfa in (None, "MONO") else check_cfa(str(layout.cfa), "--cfa")
+    frames: list[Frame] = []
+    highest, shape = 0, None
+    for number, path in enumerate((*paths, *dark)):
+        dn = read_dn(path, cfa=cfa, width=layout.width, height=layout.height)
+        if shape not in (None, dn.shape):
+            raise FsidError(f"{path}: is {dn.shape[1]}x{dn.shape[0]}, the first frame is another size")
+        if number == 0 and layout.cfa is None:
+            _check_mono(path, dn)
+        shape, highest = dn.shape, max(highest, int(dn.max()))
+        frames.append(Frame(path, _iso(path, layout), 0.0, float(dn.mean())))
+        if progress is not None:
+            progress(number + 1, len(paths) + len(dark))
+    notes = []
+    white = layout.white_level
+    if white is None:
+        white = 2 ** max(highest.bit_length(), 8) - 1
+        notes.append(
+            f"white level {white} DN taken from the largest value, {highest}; --white-level states it"
+        )
+    if any(frame.iso == 0 for frame in frames):
+        notes.append("no ISO known, noted as ISO 100; --iso states it")
+        frames = [Frame(f.path, f.iso or 100.0, f.exposure_s, f.level) for f in frames]
+    check_levels(layout.black_level or 0, white, str(paths[0]))
+    camera = Camera("", cfa, layout.black_level, white, bare=True)
+    return FrameSet(camera, tuple(frames[: len(paths)]), tuple(frames[len(paths) :]), "", tuple(notes))
+
+
+def _iso(path: Path, layout: Layout) -> float:
+    """The ISO that the caller gives, else the last one in the file's name or its folder's, else 0."""
+    if layout.iso is not None:
+        return layout.iso
+    named = _ISO_IN_PATH.findall(f"{path.parent.name}/{path.name}")
+    return float(named[-1]) if named else 0.0
+
+
+def _check_mono(path: Path, dn: np.ndarray) -> None:
+    sites = [float(dn[r::2, c::2].mean()) for r in (0, 1) for c in (0, 1)]
+    if max(sites) - min(sites) > _SITES_DIFFER * max(sites):
+        raise FsidError(
+            f"{path}: looks like a Bayer mosaic (its four sites differ); "
+            f"give --cfa RGGB, BGGR, GRBG or GBRG, or MONO where it is none"
+        )

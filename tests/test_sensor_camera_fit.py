@@ -1,0 +1,193 @@
+"""Frames on disk become the profile of the camera that took them."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fsid.cli.main import main
+from fsid.errors import FsidError
+from fsid.sensor import (
+    Layout,
+    Raw,
+    calibrate,
+    load_profile,
+    noisy_from_clean,
+    save_profile,
+    to_dn,
+    write_dng,
+)
+
+PROFILE = load_profile("galaxy-s22")
+SIDE, FRAMES = 192, 20
+
+
+def scene(light: float = 0.9, side: int = SIDE) -> Raw:
+    ramp = np.linspace(0, light, side, dtype=np.float32) ** 2
+    mosaic = np.ascontiguousarray(np.broadcast_to(ramp, (side, side)))
+    return Raw(mosaic, PROFILE.cfa, 64, 1023, (2, 1, 1.6), PROFILE.xyz_to_camera[0], camera="Maker Model")
+
+
+def exposures(rng: np.random.Generator, clean: Raw, iso: float, count: int) -> list[Raw]:
+    return [noisy_from_clean(rng, clean, iso, PROFILE.level(iso)) for _ in range(count)]
+
+
+def write_burst(folder: Path, rng, clean: Raw, iso: float, count: int = FRAMES) -> list[Path]:
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = [folder / f"{number:03d}.dng" for number in range(count)]
+    for path, raw in zip(paths, exposures(rng, clean, iso, count), strict=True):
+        write_dng(path, raw)
+    return paths
+
+
+def write_arrays(folder: Path, images: list[np.ndarray]) -> list[Path]:
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = [folder / f"{number:03d}.npy" for number in range(len(images))]
+    for path, image in zip(paths, images, strict=True):
+        np.save(path, image)
+    return paths
+
+
+def within(found, expected, error, sigmas=4.5):
+    assert np.all(np.abs(np.array(found) - np.array(expected)) < sigmas * np.array(error) + 1e-12)
+
+
+@pytest.fixture(scope="module")
+def dng_bursts(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Bursts of a ramp at three ISOs and their dark frames, as DNG."""
+    folder, rng = tmp_path_factory.mktemp("bursts"), np.random.default_rng(1)
+    for iso in (400, 1600, 6400):
+        write_burst(folder / f"light{iso}", rng, scene(), iso)
+        write_burst(folder / f"dark{iso}", rng, scene(0.0), iso, 5)
+    return folder
+
+
+def test_bursts_at_several_isos_give_a_profile_for_any_iso(dng_bursts, tmp_path):
+    isos = (400, 1600, 6400)
+    found = calibrate(
+        [dng_bursts / f"light{iso}" for iso in isos],
+        name="mine",
+        dark=[dng_bursts / f"dark{iso}" for iso in isos],
+    )
+    save_profile(tmp_path / "mine.yaml", found.profile)
+    profile = load_profile(tmp_path / "mine.yaml")
+    assert profile.iso == isos
+    assert (profile.camera, profile.cfa, profile.black_level) == ("Maker Model", PROFILE.cfa, 64)
+    measured = profile.measured
+    assert measured is not None
+    assert (measured.frames, measured.dark_frames) == ((20,) * 3, (5,) * 3)
+    np.testing.assert_allclose(measured.black, 64, atol=0.5)
+    for row, iso in enumerate(isos):
+        truth = PROFILE.level(iso)
+        within(profile.k[row], truth.k, measured.k_error[row])
+        within(profile.sigma2[row], truth.sigma2, measured.sigma2_error[row])
+    for iso in (800, 3200, 12800):
+        np.testing.assert_allclose(profile.level(iso).k, PROFILE.level(iso).k, rtol=0.12)
+    assert "k_departure" in (tmp_path / "mine.yaml").read_text()
+
+
+def test_arrays_of_several_exposures_and_isos_are_sorted_into_bursts(tmp_path, rng):
+    paths = []
+    for iso in (800, 3200):
+        images = [to_dn(r) for light in (0.3, 0.7) for r in exposures(rng, scene(light), iso, 10)]
+        paths += write_arrays(tmp_path / f"iso{iso}", images)
+    found = calibrate(paths, name="mine", layout=Layout(cfa=PROFILE.cfa, black_level=64, white_level=1023))
+    assert found.profile.iso == (800, 3200)
+    for row, iso in enumerate(found.profile.iso):
+        within(found.fits[row].k_dn / 959, PROFILE.level(iso).k, found.fits[row].k_dn_error / 959)
+    tied = calibrate(
+        paths, name="mine", layout=Layout(cfa=PROFILE.cfa, black_level=64, white_level=1023), tie_greens=True
+    )
+    assert tied.fits[0].k_dn[1] == tied.fits[0].k_dn[2]
+    assert found.fits[0].k_dn[1] != found.fits[0].k_dn[2]
+
+
+def test_the_fit_is_unbiased_over_seeds():
+    """Twenty bursts: the mean departure in units of the stated error is that of twenty normal numbers."""
+    from fsid.sensor import TemporalStatistics, fit_noise
+
+    truth, z = PROFILE.level(1600), []
+    clean = scene(side=128)
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        light, dark = TemporalStatistics(1023), TemporalStatistics(1023)
+        for raw in exposures(rng, clean, 1600, 12):
+            light.add(to_dn(raw))
+        for raw in exposures(rng, replace(clean, mosaic=0 * clean.mosaic), 1600, 12):
+            dark.add(to_dn(raw))
+        fit = fit_noise([light], cfa=PROFILE.cfa, white_level=1023, dark=dark)
+        z.append(
+            [
+                (fit.k_dn - np.array(truth.k) * 959) / fit.k_dn_error,
+                (fit.sigma2_dn - np.array(truth.sigma2) * 959**2) / fit.sigma2_dn_error,
+            ]
+        )
+    means = np.mean(z, axis=(0, 2))
+    assert np.all(np.abs(means) < 3.5 / np.sqrt(20 * 4))
+    assert np.all(np.std(z, axis=(0, 2)) < 1.4)
+
+
+@pytest.mark.parametrize(("name", "k", "dark_std"), [("001", 0.28006, 3.0731), ("003", 0.09786, 3.0130)])
+def test_the_command_meets_the_emva_reference(shared_data, tmp_path, name, k, dark_std):
+    folder = shared_data / "emva1288" / name / "images"
+    if not folder.is_dir():
+        pytest.skip(f"{folder}: no EMVA 1288 reference set here")
+    flats = sorted(folder.glob("b_[0-9]*.png"))
+    main(
+        [
+            "calibrate",
+            *map(str, flats),
+            "--dark",
+            *map(str, sorted(folder.glob("d_0[0-9][0-9]_*.png"))[:2]),
+            *("-o", str(tmp_path / "p.yaml"), "--plot", str(tmp_path / "p.png"), "--quiet"),
+        ]
+    )
+    profile = load_profile(tmp_path / "p.yaml")
+    assert profile.cfa == "MONO"
+    assert profile.k[0, 0] * profile.span == pytest.approx(k, rel=0.01)
+    assert np.sqrt(profile.sigma2[0, 0]) * profile.span == pytest.approx(dark_std, rel=0.03)
+    assert (tmp_path / "p.png").stat().st_size > 10_000
+
+
+def _fails(match, *arguments, **options):
+    with pytest.raises(FsidError, match=match) as caught:
+        calibrate(*arguments, name="mine", **options)
+    assert "\n" not in str(caught.value)
+
+
+LAYOUT = Layout(iso=800, cfa=PROFILE.cfa, black_level=64, white_level=1023)
+
+
+def test_bad_bursts_are_named(tmp_path, dng_bursts, rng):
+    light = dng_bursts / "light1600"
+    ramp = [to_dn(raw) for raw in exposures(rng, scene(), 800, 6)]
+    good = write_arrays(tmp_path / "good", ramp)
+    other = tmp_path / "other.dng"
+    write_dng(other, replace(exposures(rng, scene(), 1600, 1)[0], camera="Another Camera"))
+    lone = tmp_path / "lone.dng"
+    write_dng(lone, exposures(rng, scene(), 200, 1)[0])
+    black70 = tmp_path / "black70.dng"
+    write_dng(black70, replace(exposures(rng, scene(), 1600, 1)[0], black_level=70))
+    _fails("other.dng.*Another Camera", [light, other])
+    _fails("black70.dng.*one camera in one mode", [light, black70])
+    _fails("lone.dng.*only 1 frame", [light, lone])
+    _fails("only 2 frames", good[:2], layout=LAYOUT)
+    _fails("one kind", [light, *good])
+    _fails("no such frame", [tmp_path / "none"])
+    _fails("at least one burst", [])
+    _fails("no dark frames and no black level", good, layout=replace(LAYOUT, black_level=None))
+    _fails("states its CFA", [light], layout=LAYOUT)
+    _fails("not dark", [light], dark=[dng_bursts / "light1600"])
+    moved = write_arrays(tmp_path / "moved", [np.roll(image, 12 * n, 1) for n, image in enumerate(ramp)])
+    _fails("001.npy.*static scene", moved, layout=LAYOUT)
+    _fails("saturated", write_arrays(tmp_path / "white", [np.full((64, 64), 1023)] * 4), layout=LAYOUT)
+    sites = np.kron(np.ones((32, 32), np.int64), np.array([[100, 300], [300, 200]]))
+    _fails(
+        "looks like a Bayer", write_arrays(tmp_path / "bayer", [sites] * 4), layout=replace(LAYOUT, cfa=None)
+    )
+    small = write_arrays(tmp_path / "small", [ramp[0][:64]])
+    _fails("another size", [*good, *small], layout=LAYOUT)
+    truncated = tmp_path / "short.dng"
+    truncated.write_bytes((light / "000.dng").read_bytes()[:9000])
+    _fails("short.dng.*truncated", [light, truncated])
