@@ -16,7 +16,7 @@ from fsid.config import load_settings
 from fsid.dataset import GenerateConfig, generate, read_member, shard_keys, shard_path
 from fsid.errors import FsidError
 
-SMALL = ["width=128", "height=96", "texture_size=128"]
+SMALL = ["width=128", "height=96"]
 
 
 def small(*overrides: str) -> GenerateConfig:

@@ -19,7 +19,7 @@ class GenerateConfig:
     cameras: noise profiles, built-in names or files; each sample draws one.
     iso_range: lowest and highest ISO, drawn log-uniformly.
     supersampling: edge of the grid of samples per pixel. texture_size: pixels per
-    edge of a baked material, a power of two.
+    edge of a baked material, a power of two; 0 follows the width (see `texture_px`).
     images: a folder of photographs to use instead of scenes ("" renders scenes).
     """
 
@@ -29,7 +29,7 @@ class GenerateConfig:
     cameras: tuple[str, ...] = ("pixel6", "galaxy-s22")
     iso_range: tuple[float, float] = (400.0, 8000.0)
     supersampling: int = 2
-    texture_size: int = 1024
+    texture_size: int = 0
     images: str = ""
     scene: SceneConfig = field(default_factory=SceneConfig)
 
@@ -47,5 +47,10 @@ class GenerateConfig:
             raise FsidError("cameras: at least one noise profile is needed")
         if not 1 <= self.supersampling <= 4:
             raise FsidError(f"supersampling: {self.supersampling} is not between 1 and 4")
-        if not 64 <= self.texture_size <= 4096 or self.texture_size.bit_count() != 1:
-            raise FsidError(f"texture_size: {self.texture_size} is not a power of two from 64 to 4096")
+        if self.texture_size and (not 64 <= self.texture_size <= 4096 or self.texture_size.bit_count() != 1):
+            raise FsidError(f"texture_size: {self.texture_size} is not 0 or a power of two from 64 to 4096")
+
+    @property
+    def texture_px(self) -> int:
+        """`texture_size`, or its default: the power of two at or above half the width, 128 to 1024."""
+        return self.texture_size or 1 << min(max((self.width // 2 - 1).bit_length(), 7), 10)

@@ -131,7 +131,7 @@ def _make_shard(shard: _Shard) -> int | FsidError:
     """Bad input travels back as a value: a raised error would lose its type in some pools."""
     config = shard.dataset.generate
     try:
-        renderer = None if config.images else _renderer(config.supersampling, config.texture_size)
+        renderer = None if config.images else _renderer(config.supersampling, config.texture_px)
         write_shard(
             shard.path,
             (

@@ -47,7 +47,7 @@ def contact_sheet(
     if count < 1:
         raise FsidError(f"--count {count}: at least one scene is needed")
     tiles = []
-    with Renderer(supersampling=config.supersampling, texture_size=config.texture_size) as renderer:
+    with Renderer(supersampling=config.supersampling, texture_size=config.texture_px) as renderer:
         for i in range(count):
             progress(i, count)
             tiles.append(to_uint8(develop(make_sample(config, seed, i, renderer).clean)))

@@ -81,7 +81,7 @@ def demo(out: Path, config: DemoConfig, bar: ProgressBar) -> Path:
     if not 1 <= config.photographs <= len(PHOTOGRAPHS):
         raise FsidError(f"--photographs {config.photographs}: there are 1 to {len(PHOTOGRAPHS)}")
     data, run, testset = out / "data", out / "run", out / "testset"
-    generated = GenerateConfig(width=config.width, height=config.height, texture_size=512)
+    generated = GenerateConfig(width=config.width, height=config.height)
     with bar("rendering scenes", "pairs") as progress:
         generate(data, generated, count=config.scenes, seed=config.seed, shard_size=8, progress=progress)
     with bar("training on them", "steps") as progress:
