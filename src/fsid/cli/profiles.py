@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from rich.console import Console
-from rich.table import Table
+from rich.table import Column, Table
 from tyro.conf import Positional
 
 from fsid.errors import FsidError
@@ -24,7 +24,7 @@ def profiles(name: Positional[str | None] = None, *, plot: Path | None = None) -
     if name is None:
         if plot is not None:
             raise FsidError("fsid profiles --plot: name the profile to plot")
-        table = Table("name", "camera", "CFA", "black", "white", "ISO")
+        table = Table(Column("name", no_wrap=True), "camera", "CFA", "black", "white", "ISO")
         for known in profile_names():
             profile = load_profile(known)
             levels = (profile.cfa, str(profile.black_level), str(profile.white_level))
