@@ -28,6 +28,7 @@ def calibrate(
     height: int | None = None,
     camera: str | None = None,
     tie_greens: bool = False,
+    terms: bool = False,
     quiet: bool = False,
 ) -> None:
     """Fit Var(x) = k x + sigma2 per CFA site and ISO to bursts of static scenes; write it as a profile.
@@ -49,6 +50,8 @@ def calibrate(
         height: Height of .raw or .bin mosaics in pixels.
         camera: Name of the camera for the profile; by default the files'.
         tie_greens: Fit one line to Gr and Gb.
+        terms: Measure banding, fixed pattern, PRNU, heavy tails, drift, dark current and defects too, as far
+            as the frames show them, and switch them on in the profile.
         quiet: No progress bar, no table.
     """
     from fsid.sensor import Layout, save_profile
@@ -63,6 +66,7 @@ def calibrate(
             layout=layout,
             camera=camera,
             tie_greens=tie_greens,
+            terms=terms,
             progress=progress,
         )
     if plot is not None:

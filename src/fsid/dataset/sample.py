@@ -87,7 +87,7 @@ def make_sample(config: GenerateConfig, seed: int, index: int, renderer: SceneRe
         clean = clean_from_frame(rng, renderer.render(scene), profile)
         origin = {"scene": to_plain(scene)}
     iso, level = level_rand(rng, profile, config.iso_range)
-    noisy = noisy_from_clean(rng, clean, iso, level)
+    noisy = noisy_from_clean(rng, clean, iso, level, profile.terms)
     record = {
         "key": sample_key(index),
         "fsid_version": __version__,

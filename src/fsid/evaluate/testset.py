@@ -98,7 +98,7 @@ def photo_testset(
             (out / image.name).mkdir(parents=True, exist_ok=True)
             write_dng(out / image.name / "clean.dng", clean_levels(clean))
             for iso in isos:
-                noisy = noisy_from_clean(rng, clean, iso, profile.level(iso))
+                noisy = noisy_from_clean(rng, clean, iso, profile.level(iso), profile.terms)
                 write_dng(out / image.name / f"iso{iso}.noisy.dng", noisy)
         except OSError as error:
             raise FsidError(f"{out}: cannot be written ({error.strerror})") from None

@@ -17,6 +17,7 @@ from fsid.sensor.profiles import load_profile, profile_names, save_profile
 from fsid.sensor.quantise import clean_levels, from_dn, quantise, to_dn
 from fsid.sensor.raw import CFA_PATTERNS, NoiseLevel, Raw
 from fsid.sensor.temporal import TemporalStatistics
+from fsid.sensor.terms import NoiseTerms, add_noise_terms
 from fsid.sensor.tone import srgb_decode, srgb_encode
 from fsid.sensor.unprocess import linear_to_camera, process, unprocess
 
@@ -27,9 +28,11 @@ __all__ = [
     "Layout",
     "NoiseFit",
     "NoiseLevel",
+    "NoiseTerms",
     "Raw",
     "TemporalStatistics",
     "add_noise",
+    "add_noise_terms",
     "bayer_crop",
     "bayer_flip",
     "calibrate",

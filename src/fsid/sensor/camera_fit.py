@@ -11,7 +11,7 @@ light to the noise. What was found and left out on the way is said in `Calibrati
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +22,7 @@ from fsid.sensor.camera_profile import MONO, CameraProfile, Measurement
 from fsid.sensor.colour import published_matrices
 from fsid.sensor.frames import Frame, FrameSet, Layout, bursts, find_frames
 from fsid.sensor.temporal import TemporalStatistics
+from fsid.sensor.terms_fit import DarkFinding, dark_finding, fit_terms, prnu_of
 
 MIN_FRAMES = 3  # of one ISO; a variance from two is one number per pixel, and a defect looks like noise
 DARK_LEVEL = 0.05  # of the range, above which a dark frame saw light
@@ -49,19 +50,24 @@ def calibrate(
     layout: Layout = Layout(),
     camera: str | None = None,
     tie_greens: bool = False,
+    terms: bool = False,
     progress: Progress | None = None,
 ) -> Calibration:
     """Noise profile `name` of a camera from bursts of static scenes, `paths`, and of the covered lens.
 
     layout: what bare mosaics do not say. camera: name for the profile, else the files'. tie_greens: one
-    line for Gr and Gb. FsidError: mixed cameras, lone frames, moving scene, saturated or too few frames,
-    dark frames that are not dark.
+    line for Gr and Gb. terms: measure what there is beyond k and sigma2 too (`terms_fit`) and switch it on.
+    FsidError: mixed cameras, lone frames, moving scene, saturated or too few frames, dark frames that are
+    not dark.
     """
     found = find_frames(paths, dark, layout)
     isos = sorted({frame.iso for frame in found.frames})
     reader = _Reader(found, layout, progress)
     fits = [_fit_iso(reader, iso, tie_greens) for iso in isos]
     profile = _profile(found, isos, fits, name, camera)
+    if terms:
+        k_dn = {iso: float(fit.k_dn.mean()) for iso, fit in zip(isos, fits, strict=True)}
+        profile = replace(profile, terms=fit_terms(reader.dark, reader.prnu, k_dn))
     return Calibration(profile, tuple(fits), (*found.notes, *_notes(reader, isos, fits)))
 
 
@@ -73,6 +79,8 @@ class _Reader:
         self.drifts_dn: list[float] = []  # of bursts that drifted
         self.moved: list[Path] = []
         self.saturated: list[Path] = []
+        self.dark: list[DarkFinding] = []
+        self.prnu: list[float] = []
         self._done, self._total = 0, len(found.frames) + len(found.dark)
 
     def statistics(self, burst: Sequence[Frame], *, dark: bool = False) -> TemporalStatistics:
@@ -109,9 +117,13 @@ def _fit_iso(reader: _Reader, iso: float, tie_greens: bool) -> NoiseFit:
         )
     black = None if camera.black_level is None else _per_site(camera.black_level, camera.cfa)
     pooled: list[tuple[Samples, ...]] = []
+    fixed_dn2 = 0.0
     for number, burst in enumerate(bursts(darks)):
         stats = reader.statistics(burst, dark=True)
         _check_dark(stats, burst[0].path, camera.black_level, camera.white_level)
+        if (finding := dark_finding(stats, iso, burst[0].exposure_s)) is not None:
+            reader.dark.append(finding)
+            fixed_dn2 = finding.fixed_dn2
         if number == 0:
             black = black_of(stats, camera.cfa)
         assert black is not None
@@ -130,6 +142,8 @@ def _fit_iso(reader: _Reader, iso: float, tie_greens: bool) -> NoiseFit:
             raise FsidError(f"{burst[0].path}: {error}") from error
         if all(site.used.any() for site in samples):
             usable = True
+            if (prnu := prnu_of(stats, float(black.mean()), fixed_dn2)) is not None:
+                reader.prnu.append(prnu)
         else:
             reader.saturated.append(burst[0].path)
         pooled.append(samples)

@@ -17,6 +17,7 @@ from fsid.errors import FsidError
 from fsid.sensor.iso_law import IsoCurve, k_curve, sigma2_curve
 from fsid.sensor.quantise import ROUNDING_DN2
 from fsid.sensor.raw import NoiseLevel
+from fsid.sensor.terms import PAPER, NoiseTerms
 
 MONO = "MONO"  # stands in `cfa` for a sensor without colour filters; its four sites are alike
 
@@ -40,7 +41,7 @@ class CameraProfile:
     ascending. k, sigma2: (n, 4) float64, sites R, Gr, Gb, B, normalised units, as measured or published;
     sigma2 may be impossible here, but not in what `level` returns.
     xyz_to_camera: (m, 3, 3) matrices for D65 (DNG `ColorMatrix1`); `colour.colour_rand` blends them.
-    date: of the data. measured: None where the source states no errors.
+    date: of the data. measured: None where the source states no errors. terms: beyond the paper's model.
     """
 
     name: str
@@ -57,6 +58,7 @@ class CameraProfile:
     notes: str = ""
     date: str = ""
     measured: Measurement | None = None
+    terms: NoiseTerms = PAPER
 
     @property
     def span(self) -> int:

@@ -21,6 +21,7 @@ from fsid.sensor.noise import add_noise, before_converter
 from fsid.sensor.profiles import CameraProfile
 from fsid.sensor.quantise import quantise
 from fsid.sensor.raw import NoiseLevel, Raw
+from fsid.sensor.terms import PAPER, NoiseTerms, add_noise_terms
 from fsid.sensor.unprocess import check_srgb, linear_to_camera, unprocess
 
 if TYPE_CHECKING:  # RAW files are read and developed on machines without a graphics library
@@ -56,10 +57,26 @@ def clean_from_photo(rng: np.random.Generator, srgb: np.ndarray, profile: Camera
     return _raw(unprocess(_even(srgb), matrix, gains, exposure), matrix, gains, profile)
 
 
-def noisy_from_clean(rng: np.random.Generator, clean: Raw, iso: float, level: NoiseLevel) -> Raw:
-    """One stored exposure of `clean` at `level`: noise, then the camera's own rounding and clipping."""
-    span = clean.white_level - clean.black_level
-    return replace(quantise(add_noise(rng, clean, before_converter(level, span))), iso=iso, noise=level)
+def noisy_from_clean(
+    rng: np.random.Generator,
+    clean: Raw,
+    iso: float,
+    level: NoiseLevel,
+    terms: NoiseTerms = PAPER,
+    *,
+    unit: int = 0,
+    exposure_s: float = 0.0,
+) -> Raw:
+    """One stored exposure of `clean` at `level`: noise, then the camera's own rounding and clipping.
+
+    terms, unit, exposure_s: what the camera does beyond the paper's model; see `terms`.
+    """
+    injected = before_converter(level, clean.white_level - clean.black_level) if terms.quantisation else level
+    if terms == PAPER:
+        noisy = add_noise(rng, clean, injected)
+    else:
+        noisy = add_noise_terms(rng, clean, injected, terms, unit=unit, exposure_s=exposure_s)
+    return replace(quantise(noisy) if terms.quantisation else noisy, iso=iso, noise=level)
 
 
 def _raw(

@@ -6,11 +6,13 @@ A profile is one YAML file: the camera's integers (CFA, bits, black and white le
 each with `iso`, `k`, `sigma2` (normalised) and the same in DN (`k_dn = k span`, `sigma2_dn = sigma2 span^2`;
 a file written by hand may leave these two out), four values per entry in the order R, Gr, Gb, B. A calibrated
 one states errors, black level and number of frames beside them, and `law`, the line and the parabola through
-all ISOs, which is there to be read by people: FSID computes it again. Own profiles work by path.
+all ISOs, which is there to be read by people: FSID computes it again. `terms` says what the camera does
+beyond k and sigma2 (see `terms`); without it the model is the paper's. Own profiles work by path.
 """
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from importlib.resources import files
 from itertools import pairwise
 from pathlib import Path
@@ -26,9 +28,10 @@ from fsid.sensor.colour import published_matrices
 from fsid.sensor.iso_law import k_law, sigma2_law
 from fsid.sensor.mosaic import check_cfa
 from fsid.sensor.quantise import ROUNDING_DN2
+from fsid.sensor.terms import PAPER, NoiseTerms, parse_terms
 
 _REQUIRED = {"name", "camera", "cfa", "bits", "black_level", "white_level", "levels"}
-_OPTIONAL = {"source", "notes", "date", "xyz_to_camera", "law"}
+_OPTIONAL = {"source", "notes", "date", "xyz_to_camera", "law", "terms"}
 _MEASURED = {"k_error", "sigma2_error", "black", "frames", "dark_frames"}
 _DN_TOLERANCE = 0.01  # k_dn and sigma2_dn repeat k and sigma2; they may differ by rounding only
 
@@ -53,6 +56,8 @@ def save_profile(path: str | Path, profile: CameraProfile) -> None:
     keys = ("name", "camera", "cfa", "bits", "black_level", "white_level", "date", "source", "notes")
     data = {key: getattr(profile, key) for key in keys}
     data |= {"xyz_to_camera": profile.xyz_to_camera.tolist()}
+    if profile.terms != PAPER:
+        data["terms"] = _switched_on(profile.terms)
     if profile.measured is not None and len(profile.iso) > 1:
         data["law"] = _law(profile)
     data["levels"] = [_level(profile, row) for row in range(len(profile.iso))]
@@ -64,6 +69,10 @@ def save_profile(path: str | Path, profile: CameraProfile) -> None:
     except OSError as error:
         part.unlink(missing_ok=True)
         raise FsidError(f"{path}: cannot write this profile: {error.strerror}") from error
+
+
+def _switched_on(terms: NoiseTerms) -> dict[str, Any]:
+    return {key: value for key, value in asdict(terms).items() if value != getattr(PAPER, key)}
 
 
 def _level(profile: CameraProfile, row: int) -> dict[str, Any]:
@@ -149,6 +158,7 @@ def _parse(text: str, where: str) -> CameraProfile:
         notes=str(data.get("notes", "")),
         date=str(data.get("date", "")),
         measured=_measurement(data["levels"], where),
+        terms=parse_terms(data.get("terms", {}), f"{where}: terms"),
     )
 
 

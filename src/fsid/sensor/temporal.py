@@ -25,6 +25,7 @@ LARGEST_FLICKER = 0.1  # of the light; beyond it this is another exposure, and i
 MOVED_SHARE = 0.25  # of the blocks, from which on the burst shows no static scene
 CONTAMINATION = 0.1  # of a pixel's noise variance, from which on a changed block spoils the fit
 LARGEST_CORRELATION = 0.1  # between the changes of neighbours; noise has none
+_BANDING = 0.1  # of the noise that rows or columns may have in common
 _GRID = 8
 _THINNING = 4
 _MIN_BLOCK_SIDE_PX = 8
@@ -161,20 +162,18 @@ class TemporalStatistics:
     def _match(self, change: np.ndarray, name: str) -> tuple[float, float]:
         """(gain, offset) of a frame against the first one; (1, 0) where neither is significant."""
         usable = ~self._moved & (self._blocks(self._clipped, np.mean) < _MAX_CLIPPED_SHARE)
-        pixels = self._block[0] * self._block[1]
-        means, noise = self._blocks(change, np.mean), self._blocks(change, np.var)
+        means, noise = self._blocks(change, np.mean), np.maximum(self._blocks(change, np.var), 1 / 12)
         if usable.sum() < _MIN_BLOCKS:
             return 1.0, 0.0
-        weight = pixels / np.maximum(noise[usable], 1 / 12)
-        gain, offset = _gain_and_offset(means[usable], self._reference[usable], weight)
-        left = means - (gain - 1) * self._reference - offset
-        error2 = np.maximum(noise, 1 / 12) / pixels
-        spoils = left**2 > CONTAMINATION * np.maximum(noise, 1 / 12) / 2
-        self._exclude(usable & spoils & (left**2 > SIGNIFICANT**2 * error2), name)
+        height, width = self._block
+        error2 = noise * (1 / (height * width) + _BANDING / min(height, width))
+        gain, offset = _gain_and_offset(means[usable], self._reference[usable], 1 / error2[usable])
+        left2 = (means - (gain - 1) * self._reference - offset) ** 2
+        self._exclude(usable & (left2 > CONTAMINATION * noise / 2) & (left2 > SIGNIFICANT**2 * error2), name)
         if abs(gain - 1) > LARGEST_FLICKER:
             raise FsidError(
-                f"{name}: its light differs by {100 * (gain - 1):+.0f} % from the first frame of the burst; "
-                f"use steady light, or leave it out"
+                f"{name}: its light differs by {100 * (gain - 1):+.0f} % from the first frame of the burst, "
+                f"or the scene moved; use steady light and a tripod, or leave it out"
             )
         return gain, offset
 

@@ -1,0 +1,117 @@
+"""The terms beyond k and sigma2, from what calibration streams anyway; see `terms` for their meaning.
+
+    row, column         variance of row (column) means of dark frames beyond what pixel noise leaves in them
+    tail, drift         kurtosis of the changes of dark pixels; variance of the frames' levels
+    fixed, prnu         spatial variance of the mean image, dark or evenly lit, less the noise left in it
+    dark_current_e_s    slope of the dark level over exposure time, in electrons (k DN each)
+    defective           share of dark pixels far from their neighbours
+
+Spatial variance is that of differences between neighbours of the same colour: vignetting is smooth and
+cancels. A term that does not stand out of its own error is left off. Poisson statistics and quantisation are
+no measurements: they are how sensors work, and stay the user's choice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fsid.sensor.calibrate import RESOLVED_DN2
+from fsid.sensor.temporal import TemporalStatistics
+from fsid.sensor.terms import NoiseTerms
+
+FLAT = 0.1  # contrast of an evenly lit burst, relative to its signal; beyond it texture looks like PRNU
+FAR = 10.0  # robust standard deviations: a defective pixel
+_STANDING_OUT = 0.02  # share of the noise from which on a term is worth having
+_GAUSS_MAD = 0.6745  # median absolute deviation of a standard normal number
+
+
+@dataclass(frozen=True)
+class DarkFinding:
+    """What one dark burst shows: terms, and the level in DN (black included) at its ISO and exposure time."""
+
+    iso: float
+    exposure_s: float
+    level_dn: float
+    fixed_dn2: float
+    terms: NoiseTerms
+
+
+def dark_finding(stats: TemporalStatistics, iso: float, exposure_s: float) -> DarkFinding | None:
+    """The terms that dark frames show; None where their noise drowns in the rounding of the converter."""
+    found = stats.read_statistics()
+    if found.pixel_dn2 < RESOLVED_DN2:
+        return None
+    mean = stats.mean()
+    left = found.pixel_dn2 / stats.frames
+    steps = mean[:, 2:] - mean[:, :-2]
+    spread = float(np.median(np.abs(steps))) / _GAUSS_MAD
+    fixed2 = max(spread**2 / 2 - left, 0.0)
+    far = np.abs(mean - np.median(mean)) > FAR * max(spread, 0.1)
+    terms = NoiseTerms(
+        row=_standing_out(found.row_dn2 / found.pixel_dn2),
+        column=_standing_out(found.column_dn2 / found.pixel_dn2),
+        tail=_standing_out(found.excess_kurtosis),
+        drift=float(np.sqrt(_standing_out(found.level_dn2 / found.pixel_dn2))),
+        fixed=float(np.sqrt(_standing_out(fixed2 / found.pixel_dn2))),
+        defective=float(far.mean()),
+    )
+    return DarkFinding(iso, exposure_s, float(mean[~far].mean()), fixed2, terms)
+
+
+def prnu_of(stats: TemporalStatistics, black_dn: float, fixed_dn2: float) -> float | None:
+    """Relative gain pattern of an evenly lit burst; None where the burst is not even, or too dark to tell.
+
+    fixed_dn2: variance of the pattern that is there without light.
+    """
+    signal = stats.level_dn - black_dn
+    if signal <= 0 or stats.contrast_dn > FLAT * signal or stats.clipped_share > FLAT:
+        return None
+    mean = stats.mean()
+    variance = np.concatenate([site[1] for site in stats.sites(None)])
+    spread = float(np.median(np.abs(mean[:, 2:] - mean[:, :-2]))) / _GAUSS_MAD
+    left = float(np.mean(variance)) / stats.frames
+    pattern2 = spread**2 / 2 - left - fixed_dn2
+    return float(np.sqrt(pattern2)) / signal if pattern2 > 0.1 * left else 0.0
+
+
+def fit_terms(
+    dark: Sequence[DarkFinding], prnu: Sequence[float], k_dn_at_iso: dict[float, float]
+) -> NoiseTerms:
+    """The mean of what the bursts of all ISOs show."""
+
+    def mean(name: str) -> float:
+        return _rounded(float(np.mean([getattr(found.terms, name) for found in dark]))) if dark else 0.0
+
+    return NoiseTerms(
+        row=mean("row"),
+        column=mean("column"),
+        tail=mean("tail"),
+        drift=mean("drift"),
+        fixed=mean("fixed"),
+        defective=mean("defective"),
+        prnu=_rounded(float(np.median(prnu))) if prnu else 0.0,
+        dark_current_e_s=_dark_current(dark, k_dn_at_iso),
+    )
+
+
+def _dark_current(dark: Sequence[DarkFinding], k_dn_at_iso: dict[float, float]) -> float:
+    """Electrons per second; 0 where no ISO has dark frames of two exposure times."""
+    slopes = []
+    for iso, k_dn in k_dn_at_iso.items():
+        points = [(found.exposure_s, found.level_dn / k_dn) for found in dark if found.iso == iso]
+        times = {time for time, _ in points}
+        if len(times) > 1:
+            seconds, electrons = np.array(points).T
+            slopes.append(float(np.polyfit(seconds, electrons, 1)[0]))
+    return _rounded(max(float(np.mean(slopes)), 0.0)) if slopes else 0.0
+
+
+def _standing_out(share: float) -> float:
+    return share if share > _STANDING_OUT else 0.0
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.3g}")

@@ -1,0 +1,168 @@
+"""Each term beyond the paper's model keeps its law, leaves the others alone, and is found by calibration."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fsid.errors import FsidError
+from fsid.sensor import (
+    Layout,
+    NoiseLevel,
+    NoiseTerms,
+    Raw,
+    add_noise_terms,
+    calibrate,
+    load_profile,
+    noisy_from_clean,
+    save_profile,
+    to_dn,
+)
+from fsid.sensor.poisson import poisson
+
+LEVEL = NoiseLevel(k=(2e-3, 2e-3, 2e-3, 2e-3), sigma2=(4e-5, 4e-5, 4e-5, 4e-5))
+SIDE, FRAMES = 128, 40
+
+
+def flat(x: float, side: int = SIDE) -> Raw:
+    return Raw(np.full((side, side), x, np.float32), "RGGB", 64, 1023, (2.0, 1.0, 1.5), np.eye(3))
+
+
+def stack(terms: NoiseTerms, x: float = 0.0, frames: int = FRAMES, **options) -> np.ndarray:
+    """(frames, H, W) float64 noise."""
+    rng = np.random.default_rng(0)
+    noisy = [add_noise_terms(rng, flat(x), LEVEL, terms, **options).mosaic for _ in range(frames)]
+    return np.array(noisy, np.float64) - x
+
+
+@pytest.mark.parametrize(
+    "terms",
+    [
+        NoiseTerms(),
+        NoiseTerms(poisson=True),
+        NoiseTerms(row=0.2, column=0.1),
+        NoiseTerms(tail=1.0),
+        NoiseTerms(fixed=0.5, prnu=0.02),
+    ],
+)
+@pytest.mark.parametrize("x", [0.0, 0.01, 0.5])
+def test_the_variance_over_time_stays_the_line(terms, x):
+    noise = stack(terms, x)
+    expected = LEVEL.k[0] * x + LEVEL.sigma2[0]
+    # Rows and columns have few independent numbers: 128 x 40 of each.
+    assert noise.var(axis=0, ddof=1).mean() == pytest.approx(expected, rel=0.02)
+    assert abs(noise.mean()) < 4.5 * np.sqrt(expected * 0.3 / (SIDE * FRAMES)) + 4.5 * 0.5 * 6.3e-3 / SIDE
+
+
+def test_banding_is_common_to_rows_and_columns():
+    noise = stack(NoiseTerms(row=0.2, column=0.1))
+    noise -= noise.mean(axis=(1, 2), keepdims=True)
+    left = 0.7 * LEVEL.sigma2[0] / SIDE
+    assert noise.mean(axis=2).var() - left == pytest.approx(0.2 * LEVEL.sigma2[0], rel=0.1)
+    assert noise.mean(axis=1).var() - left == pytest.approx(0.1 * LEVEL.sigma2[0], rel=0.1)
+
+
+def test_fixed_pattern_and_prnu_belong_to_the_unit():
+    terms, sigma = NoiseTerms(fixed=0.5, prnu=0.02), np.sqrt(LEVEL.sigma2[0])
+    dark, bright = stack(terms).mean(axis=0), stack(terms, 0.5).mean(axis=0)
+    assert dark.var() == pytest.approx((0.25 + 1 / FRAMES) * sigma**2, rel=0.05)
+    gain = bright - dark
+    assert gain.var() == pytest.approx((0.02 * 0.5) ** 2 + (2 * sigma**2 + 1e-3) / FRAMES, rel=0.05)
+    other = stack(terms, unit=1).mean(axis=0)
+    shared = 1 / FRAMES / (0.25 + 1 / FRAMES)  # the noise that is left in both means, of one seed
+    assert np.corrcoef(dark.ravel(), other.ravel())[0, 1] == pytest.approx(shared, abs=0.05)
+
+
+def test_tail_drift_dark_current_and_defects():
+    noise = stack(NoiseTerms(tail=1.0)) / np.sqrt(LEVEL.sigma2[0])
+    assert np.mean(noise**4) - 3 == pytest.approx(1.0, rel=0.25)
+    levels = stack(NoiseTerms(drift=0.5), frames=200).mean(axis=(1, 2))
+    assert levels.std() == pytest.approx(0.5 * np.sqrt(LEVEL.sigma2[0]), rel=0.2)
+    charged = stack(NoiseTerms(dark_current_e_s=10.0), exposure_s=2.0)
+    assert charged.mean() == pytest.approx(20 * LEVEL.k[0], rel=0.01)
+    assert charged.var() == pytest.approx(20 * LEVEL.k[0] ** 2 + LEVEL.sigma2[0], rel=0.02)
+    broken = np.abs(stack(NoiseTerms(defective=0.01)).mean(axis=0)) > 0.01
+    assert broken.mean() == pytest.approx(0.01, rel=0.2)
+
+
+def test_a_few_electrons_come_in_integers():
+    terms = NoiseTerms(poisson=True)
+    still = replace(flat(0.004), noise=None)
+    level = NoiseLevel(LEVEL.k, (0.0,) * 4)
+    counts = add_noise_terms(np.random.default_rng(0), still, level, terms).mosaic / LEVEL.k[0]
+    np.testing.assert_allclose(counts, np.rint(counts), atol=1e-5)
+    share_of_none = np.mean(counts == 0)
+    assert share_of_none == pytest.approx(np.exp(-2.0), abs=4.5 * np.sqrt(0.135 / counts.size))
+
+
+@pytest.mark.parametrize("lam", [0.0, 0.3, 4.0, 9.9, 10.0, 12.0, 30.0, 500.0])
+def test_counts_have_the_moments_of_poisson(lam):
+    n = 400_000
+    counts = poisson(np.random.default_rng(1), np.full((n,), lam, np.float32)).astype(np.float64)
+    assert np.all(counts == np.rint(counts))
+    assert counts.min() >= 0
+    assert abs(counts.mean() - lam) <= 4.5 * np.sqrt(lam / n)
+    assert abs(counts.var() - lam) <= 4.5 * np.sqrt((lam + 2 * lam**2) / n) + 0.001 * lam
+    third = np.mean((counts - lam) ** 3)
+    assert abs(third - lam) <= 4.5 * np.sqrt(15 * (lam + lam**3) / n) + 0.03 * lam
+
+
+def test_a_mixture_of_few_and_many_electrons_keeps_its_places():
+    lam = np.array([[0.0, 1000.0], [5.0, 1e5]], np.float32).repeat(500, 0)
+    counts = poisson(np.random.default_rng(0), lam)
+    np.testing.assert_allclose(counts[:500].mean(axis=0), [0, 1000], rtol=0.01)
+    np.testing.assert_allclose(counts[500:].mean(axis=0), [5, 1e5], rtol=0.1)
+
+
+def test_the_default_is_the_papers_model():
+    profile = load_profile("pixel6")
+    assert profile.terms == NoiseTerms()
+    draws = [
+        noisy_from_clean(np.random.default_rng(4), flat(0.1), 800, profile.level(800), *terms).mosaic
+        for terms in ((), (profile.terms,))
+    ]
+    np.testing.assert_array_equal(*draws)
+    unrounded = noisy_from_clean(
+        np.random.default_rng(4), flat(0.1), 800, LEVEL, NoiseTerms(quantisation=False)
+    ).mosaic
+    assert np.any(np.abs(unrounded * 959 - np.rint(unrounded * 959)) > 0.1)
+
+
+def test_switching_one_term_leaves_the_others_noise(tmp_path):
+    plain, banded = stack(NoiseTerms(), 0.3, 1), stack(NoiseTerms(row=0.0001), 0.3, 1)
+    assert np.max(np.abs(plain - banded)) < 1e-3
+
+
+def test_terms_survive_the_file_and_unknown_ones_are_named(tmp_path):
+    profile = replace(load_profile("pixel6"), terms=NoiseTerms(poisson=True, row=0.05))
+    save_profile(tmp_path / "p.yaml", profile)
+    assert load_profile(tmp_path / "p.yaml").terms == profile.terms
+    text = (tmp_path / "p.yaml").read_text()
+    for old, new, words in (
+        ("row: 0.05", "roww: 0.05", "roww"),
+        ("row: 0.05", "row: -1", "row"),
+        ("row: 0.05", "row: 1.5", "shares"),
+        ("poisson: true", "poisson: 3", "true or false"),
+    ):
+        (tmp_path / "bad.yaml").write_text(text.replace(old, new))
+        with pytest.raises(FsidError, match=rf"bad\.yaml.*{words}"):
+            load_profile(tmp_path / "bad.yaml")
+
+
+def test_calibration_finds_the_terms_again(tmp_path):
+    terms = NoiseTerms(row=0.1, column=0.05, tail=1.0, fixed=0.4, prnu=0.01, defective=0.002)
+    rng, level = np.random.default_rng(3), NoiseLevel(LEVEL.k, (1e-4,) * 4)
+    paths = {}
+    for kind, x, count in (("light", 0.5, 60), ("dark", 0.0, 60)):
+        (tmp_path / kind).mkdir()
+        paths[kind] = tmp_path / kind
+        for number in range(count):
+            noisy = noisy_from_clean(rng, flat(x, 192), 800, level, terms)
+            np.save(tmp_path / kind / f"{number:03d}.npy", to_dn(noisy))
+    layout = Layout(iso=800, cfa="RGGB", white_level=1023)
+    found = calibrate([paths["light"]], name="p", dark=[paths["dark"]], layout=layout, terms=True)
+    measured = found.profile.terms
+    for name, rtol in (("row", 0.25), ("column", 0.25), ("fixed", 0.1), ("prnu", 0.15), ("defective", 0.3)):
+        assert getattr(measured, name) == pytest.approx(getattr(terms, name), rel=rtol), name
+    assert 0.3 < measured.tail < 1.1  # of the sum with rows, columns and rounding, which are Gaussian
+    np.testing.assert_allclose(found.profile.sigma2[0], 1e-4, rtol=0.05)
