@@ -21,7 +21,7 @@ NEAR_M = 0.02
 
 @dataclass(frozen=True)
 class Lens:
-    """rotation: (3, 3), rows right, up, forward. position: (3,) metres. focal: (f_x, f_y) in half image sizes."""
+    """rotation: (3, 3), rows right, up, forward. position: (3,) metres. focal: x, y in half sizes."""
 
     rotation: np.ndarray
     position: np.ndarray

@@ -18,8 +18,8 @@ REQUIRED_VERSION = 430
 _MAX_DEVICES = 16
 _SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swiftshader")
 _HELP = (
-    "install the Debian packages libegl1 libgl1 libgl1-mesa-dri for software rendering; in an NVIDIA container "
-    "set NVIDIA_DRIVER_CAPABILITIES=graphics (or all) for the GPU"
+    "install the Debian packages libegl1 libgl1 libgl1-mesa-dri for software rendering; in an NVIDIA "
+    "container set NVIDIA_DRIVER_CAPABILITIES=graphics (or all) for the GPU"
 )
 
 
@@ -71,14 +71,9 @@ def gl_info(context: moderngl.Context) -> GlInfo:
 
 
 def _create(device_index: int) -> moderngl.Context:
+    settings: Any = {"backend": "egl", "libgl": "libGL.so.1", "libegl": "libEGL.so.1"}
+    settings["device_index"] = device_index
     try:
-        return moderngl.create_context(
-            standalone=True,
-            backend="egl",
-            libgl="libGL.so.1",
-            libegl="libEGL.so.1",
-            require=REQUIRED_VERSION,
-            device_index=device_index,
-        )
+        return moderngl.create_context(require=REQUIRED_VERSION, standalone=True, **settings)
     except Exception as error:  # the EGL backend raises bare Exception
         raise FsidError(f"no OpenGL 4.3 on EGL device {device_index} ({error}): {_HELP}") from None

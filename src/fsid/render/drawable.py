@@ -74,7 +74,7 @@ def _objects(scene: Scene) -> list[Drawable]:
         mesh = build_mesh(S.family, S.seed)
         if len(M) != len(mesh.part_names):
             raise FsidError(
-                f"scene.materials[{i}]: {len(M)} materials for the {len(mesh.part_names)} parts of '{S.family}'"
+                f"scene.materials[{i}]: {len(M)} materials, but '{S.family}' has {len(mesh.part_names)} parts"
             )
         out.append(Drawable(mesh, T, M, i))
     return out

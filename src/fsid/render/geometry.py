@@ -43,8 +43,8 @@ SURFACE = np.dtype(
 class Geometry:
     """vertices: VERTEX (V,). indices: (3 F,) uint32, drawable after drawable. surfaces: SURFACE (P,).
 
-    ranges: (N, 2) first index and number of indices of each drawable. spheres: (N, 4) world centre and radius.
-    casters: (N,) bool, which drawables cast a shadow.
+    ranges: (N, 2) first index and number of indices of each drawable.
+    spheres: (N, 4) world centre and radius. casters: (N,) bool, which drawables cast a shadow.
     """
 
     vertices: np.ndarray
@@ -72,7 +72,7 @@ def merge(drawables: Sequence[Drawable], layer_of: Callable[[Material], Layer]) 
     return Geometry(
         vertices=np.concatenate(vertices),
         indices=np.concatenate(indices),
-        surfaces=np.array(surfaces, SURFACE),
+        surfaces=np.stack(surfaces),
         ranges=np.array(ranges, np.uint32),
         spheres=np.array(spheres),
         casters=np.array([d.casts_shadow for d in drawables]),
@@ -118,7 +118,7 @@ def _with_surfaces(mesh: Mesh, first_surface: int) -> tuple[np.ndarray, np.ndarr
     return vertices, faces.astype(np.uint32).ravel()
 
 
-def _surface(drawable: Drawable, material: Material, layer: Layer) -> np.void:
+def _surface(drawable: Drawable, material: Material, layer: Layer) -> np.ndarray:
     surface = np.zeros((), SURFACE)
     surface["place"][:, :3] = rotation_matrix(*drawable.transform.rotation_deg)
     surface["place"][:, 3] = drawable.transform.position_m
@@ -132,7 +132,7 @@ def _surface(drawable: Drawable, material: Material, layer: Layer) -> np.void:
     surface["slope_scale"] = layer.slope_scale * material.relief_scale
     surface["specular"] = drawable.specular
     surface["object_id"] = drawable.object_id + 1
-    return surface[()]
+    return surface
 
 
 def _sphere(mesh: Mesh, transform: Transform) -> tuple[float, float, float, float]:

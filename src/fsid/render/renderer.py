@@ -61,15 +61,23 @@ class Renderer:
             raise FsidError(f"texture_size {texture_size}: must be a power of two from 64 to 8192")
         self._context = open_context(device_index)
         Renderer._active = self
-        self._grid = supersampling
-        self._layers = LayerStore(self._context, texture_size)
-        self._depth = load_program(self._context, "depth.vert", None)
-        self._surface = load_program(self._context, "surface.vert", "surface.frag")
-        self._occlusion = load_program(self._context, "screen.vert", "occlusion.frag")
-        self._lighting = load_program(self._context, "screen.vert", "lighting.frag")
-        self._targets = Targets(self._context, supersampling)
-        self._atlas = ShadowAtlas(self._context)
-        _set(self._occlusion, grid=supersampling, taps=_spiral(24, 1.0))
+        try:
+            self._prepare(supersampling, texture_size)
+        except BaseException:
+            self.close()
+            raise
+
+    def _prepare(self, supersampling: int, texture_size: int) -> None:
+        context = self._context
+        self._layers = LayerStore(context, texture_size)
+        self._depth = load_program(context, "depth.vert", None)
+        self._surface = load_program(context, "surface.vert", "surface.frag")
+        self._occlusion = load_program(context, "screen.vert", "occlusion.frag")
+        self._blur = load_program(context, "screen.vert", "blur.frag")
+        self._lighting = load_program(context, "screen.vert", "lighting.frag")
+        self._targets = Targets(context, supersampling)
+        self._atlas = ShadowAtlas(context)
+        _set(self._occlusion, grid=supersampling, taps=_spiral(32, 1.0))
         _set(self._lighting, grid=supersampling, search_taps=_spiral(12), filter_taps=_spiral(28))
 
     @property
@@ -138,6 +146,10 @@ class Renderer:
             buffers.release()
             mark("readback")
 
+    def wait(self) -> None:
+        """Return when everything issued so far is done; only measuring needs it."""
+        self._context.finish()
+
     def _draw_shadows(self, geometry: Geometry, plan: ShadowPlan, buffers: _Buffers) -> None:
         casters = np.flatnonzero(geometry.casters)
         self._context.enable_only(moderngl.DEPTH_TEST)
@@ -182,14 +194,19 @@ class Renderer:
         _set(self._occlusion, **common)
         self._targets.begin_occlusion()
         buffers.draw_screen(self._occlusion)
+        for back in (False, True):
+            _set(self._blur, direction=(0, 1) if back else (1, 0), size=self._targets.size)
+            self._targets.begin_blur(back=back)
+            buffers.draw_screen(self._blur)
         _set(
             self._lighting,
             **common,
             origin=lens.position,
             shift=shift_px,
-            light_count=len(plan.light_table),
+            light_count=plan.light_count,
             tile_px=float(plan.tile_px),
             ambient_sides=room.sides,
+            mean_sides=room.radiance.mean((1, 2)),
             room_half=np.array(room.size_m) / 2,
         )
         self._targets.begin_lighting()
@@ -206,8 +223,8 @@ class _Buffers:
         self._vertices = context.buffer(geometry.vertices.tobytes())
         self._indices = context.buffer(geometry.indices.tobytes())
         self._owned: list[Any] = [self._vertices, self._indices]
-        for binding, table in enumerate((geometry.surfaces, plan.light_table, plan.tile_table)):
-            buffer = context.buffer(table.tobytes() or bytes(64))
+        for binding, table in enumerate((geometry.surfaces, plan.table)):
+            buffer = context.buffer(table.tobytes())
             buffer.bind_to_storage_buffer(binding)
             self._owned.append(buffer)
         sides, height, width, _ = room.radiance.shape

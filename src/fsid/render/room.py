@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fsid.render.shadows import cone_cosines
 from fsid.scene.model import Light, Vec3
 
 GRID = 16
@@ -61,9 +62,9 @@ def _cone(light: Light, direction: np.ndarray) -> np.ndarray:
     """Strength of a spot by direction, as `arriving` in shaders/lights.glsl."""
     if light.kind != "spot":
         return np.ones(direction.shape[:-1])
-    half = np.radians(light.cone_deg) / 2
-    outer, inner = np.cos(half), np.cos(0.8 * half)
-    t = np.clip((direction @ np.array(light.direction) - outer) / (inner - outer), 0.0, 1.0)
+    outer, inner = cone_cosines(light)
+    along = direction @ (np.array(light.direction) / np.linalg.norm(light.direction))
+    t = np.clip((along - outer) / (inner - outer), 0.0, 1.0)
     return t * t * (3 - 2 * t)
 
 

@@ -30,6 +30,9 @@ LIGHT = np.dtype(
         ("cos_outer", "f4"),
         ("colour", "3f4"),
         ("cos_inner", "f4"),
+        ("right", "3f4"),
+        ("focal", "f4"),
+        ("up", "4f4"),
         ("first_tile", "i4"),
         ("tile_count", "i4"),
         ("padding", "2i4"),
@@ -37,13 +40,10 @@ LIGHT = np.dtype(
 )
 """std430 layout of `struct Light` in shaders/lights.glsl."""
 
-TILE = np.dtype([("axes", "(3,4)f4"), ("place", "4f4")])
-"""std430 layout of `struct Tile`: rows right, up, forward, the last with the focal length."""
-
 
 @dataclass(frozen=True)
 class Tile:
-    """origin: (3,) metres. axes: (3, 3) rows right, up, forward. focal: in half tiles. corner: (x, y) texels."""
+    """origin: (3,) metres. axes: (3, 3) rows right, up, forward. focal: in half tiles. corner: texels."""
 
     origin: np.ndarray
     axes: np.ndarray
@@ -53,63 +53,68 @@ class Tile:
 
 @dataclass(frozen=True)
 class ShadowPlan:
-    """The tiles of all lights in an atlas of `size` texels, `tile_px` a side each; and the two GPU tables."""
+    """The tiles of all lights in an atlas of `size` texels, `tile_px` a side each; and the lights' table."""
 
     tiles: list[Tile]
     size: tuple[int, int]
     tile_px: int
-    light_table: np.ndarray
-    tile_table: np.ndarray
+    light_count: int
+    table: np.ndarray
 
 
 def plan_shadows(lights: Sequence[Light]) -> ShadowPlan:
     """Tiles of every light: 1024 texels a side for up to four point lights, 512 for more."""
     fields = [_fields(light) for light in lights]
     count = sum(len(f) for f in fields)
-    tile_px = 1024 if count <= 4 * 6 else 512
+    tile_px = 1024 if count <= 4 * len(_SIDES) else 512
     tiles: list[Tile] = []
-    light_table = np.zeros(len(lights), LIGHT)
-    for light, field, row in zip(lights, fields, light_table, strict=True):
-        _fill(row, light, len(tiles), len(field))
+    table = np.zeros(max(1, len(lights)), LIGHT)
+    for light, field, row in zip(lights, fields, table, strict=False):
+        first = len(tiles)
         for axes, half_tan in field:
             y, x = divmod(len(tiles), _COLUMNS)
-            focal = 1.0 / (half_tan + BORDER)
-            tiles.append(Tile(np.array(light.position_m), axes, focal, (x * tile_px, y * tile_px)))
+            corner = (x * tile_px, y * tile_px)
+            tiles.append(Tile(np.array(light.position_m), axes, 1.0 / (half_tan + BORDER), corner))
+        _fill(row, light, first, tiles[first:])
     size = (max(1, min(count, _COLUMNS)) * tile_px, max(1, -(-count // _COLUMNS)) * tile_px)
-    return ShadowPlan(tiles, size, tile_px, light_table, _tile_table(tiles, size, tile_px))
+    return ShadowPlan(tiles, size, tile_px, len(lights), table)
 
 
 def _fields(light: Light) -> list[tuple[np.ndarray, float]]:
     """(axes, tangent of the half field) of each tile of a light."""
     if light.kind == "spot" and light.cone_deg <= _WIDEST_SPOT_DEG:
         return [(_axes_along(np.array(light.direction)), float(np.tan(np.radians(light.cone_deg) / 2)))]
-    directions = [sign * np.eye(3)[axis] for axis in range(3) for sign in (1.0, -1.0)]
-    return [(_axes_along(direction), 1.0) for direction in directions]
+    return [(axes, 1.0) for axes in _SIDES]
 
 
 def _axes_along(forward: np.ndarray) -> np.ndarray:
-    """(3, 3) rows right, up, forward, all along world axes where `forward` is one."""
+    """(3, 3) rows right, up, forward."""
     forward = forward / np.linalg.norm(forward)
-    helper = np.eye(3)[int(np.argmin(np.abs(forward)))]
-    right = np.cross(forward, helper)
+    right = np.cross(forward, np.eye(3)[int(np.argmin(np.abs(forward)))])
     right /= np.linalg.norm(right)
     return np.stack([right, np.cross(right, forward), forward])
 
 
-def _fill(row: np.void, light: Light, first_tile: int, tile_count: int) -> None:
+def _fill(row: np.void, light: Light, first_tile: int, tiles: Sequence[Tile]) -> None:
     row["position"], row["radius_m"], row["colour"] = light.position_m, light.radius_m, light.colour
     row["direction"] = np.array(light.direction) / max(float(np.linalg.norm(light.direction)), 1e-12)
+    row["cos_outer"], row["cos_inner"] = cone_cosines(light)
+    row["right"], row["up"][:3] = tiles[0].axes[:2]
+    row["focal"] = tiles[0].focal
+    row["first_tile"], row["tile_count"] = first_tile, len(tiles)
+
+
+def cone_cosines(light: Light) -> tuple[float, float]:
+    """Cosines at which a spot is dark and at full strength; below -1 for a point light."""
+    if light.kind != "spot":
+        return -2.0, -1.5
     half = np.radians(light.cone_deg) / 2
-    is_spot = light.kind == "spot"
-    row["cos_outer"] = np.cos(half) if is_spot else -2.0
-    row["cos_inner"] = np.cos(0.8 * half) if is_spot else -1.5
-    row["first_tile"], row["tile_count"] = first_tile, tile_count
+    return float(np.cos(half)), float(np.cos(0.8 * half))
 
 
-def _tile_table(tiles: Sequence[Tile], size: tuple[int, int], tile_px: int) -> np.ndarray:
-    table = np.zeros(max(1, len(tiles)), TILE)
-    for row, tile in zip(table, tiles, strict=False):
-        row["axes"][:, :3] = tile.axes
-        row["axes"][2, 3] = tile.focal
-        row["place"] = (*np.divide(tile.corner, size), *np.divide(tile_px, size))
-    return table
+_SIDES = [
+    np.roll(np.eye(3), -(axis + 1), axis=0) * np.array([[1.0], [1.0], [sign]])
+    for axis in range(3)
+    for sign in (1.0, -1.0)
+]
+"""Axes of the six tiles of a point light, forward +x -x +y -y +z -z; mirrored ones do no harm to depth."""

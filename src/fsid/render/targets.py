@@ -33,16 +33,18 @@ class Targets:
         self._b = context.texture(large, 2, dtype="u4")
         self._depth = context.depth_texture(large)
         self._depth.compare_func = ""
-        self._open = context.texture(size, 2, dtype="f4")
+        self._open, self._blurred = (context.texture(size, 2, dtype="f4") for _ in range(2))
         self._result = [context.texture(size, 4, dtype="f4") for _ in range(3)]
-        for texture in (self._a, self._b, self._depth, self._open):
+        images = [self._a, self._b, self._depth, self._open, self._blurred, *self._result]
+        for texture in images:
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._to_depth = context.framebuffer([], self._depth)
         self._to_surfaces = context.framebuffer([self._a, self._b], self._depth)
         self._to_open = context.framebuffer([self._open])
+        self._to_blurred = context.framebuffer([self._blurred])
         self._to_result = context.framebuffer(self._result)
-        framebuffers = [self._to_depth, self._to_surfaces, self._to_open, self._to_result]
-        self._owned = [*framebuffers, self._a, self._b, self._depth, self._open, *self._result]
+        framebuffers = [self._to_depth, self._to_surfaces, self._to_open, self._to_blurred, self._to_result]
+        self._owned = [*framebuffers, *images]
         self.size = size
 
     def begin_depth(self) -> None:
@@ -60,6 +62,11 @@ class Targets:
         self._b.use(1)
         self._depth.use(2)
         self._to_open.use()
+
+    def begin_blur(self, *, back: bool) -> None:
+        """Draw the occlusion of unit 0 into the second image, or back into the first."""
+        (self._blurred if back else self._open).use(0)
+        (self._to_open if back else self._to_blurred).use()
 
     def begin_lighting(self) -> None:
         """Draw the result; units 0, 1, 5, 6 hold the G-buffer and the occlusion."""

@@ -1,7 +1,7 @@
 #version 430 core
-// Radiance of one pixel from its samples. A pixel whose samples lie on one plane of one object is lit once
-// with their mean (light is linear in albedo; the spread of the normals widens the highlight); any other
-// pixel is lit sample by sample. Output: the frame at its final size.
+// Radiance of one pixel from its samples. Samples that lie on one plane of one object are lit once, with their
+// mean: light is linear in the colours, and the spread of the normals widens the highlight. A pixel inside
+// a surface is one such group, one at an edge two or three. Output: the frame at its final size.
 #include "encoding.glsl"
 #include "lights.glsl"
 #include "room.glsl"
@@ -19,26 +19,75 @@ layout(location = 0) out vec4 out_radiance;   // a: depth in metres, 0 where not
 layout(location = 1) out vec4 out_albedo;     // a: object id + 1
 layout(location = 2) out vec4 out_normal;     // camera space
 
-const int MAX_SAMPLES = 16;
 const float PLANE_TOLERANCE = 0.002;  // of the distance
+const float MIN_FACE_COSINE = 0.97;
+const float MIN_NORMAL_COSINE = 0.85;
 
 struct Point {
-    Sample surface;
     vec3 position;
-    vec3 normal;       // mean, its length tells the spread
+    vec3 normal;         // of a group the mean: its length tells the spread
+    vec3 face_normal;
+    vec3 diffuse, f0;    // albedo of the diffuse part, reflectance at normal incidence
+    float alpha2;
+    float depth;
+    int object_id;       // one more than in the frame, -1 where nothing was hit
 };
 
-Point point_at(ivec2 pixel, int i) {
+Sample sample_at(ivec2 texel) {
+    Sample s = unpack_sample(texelFetch(samples_a, texel, 0), texelFetch(samples_b, texel, 0).xy);
+    if (texelFetch(window_depth, texel, 0).r >= 1.0) s.object_id = -1;
+    return s;
+}
+
+Point point_at(ivec2 pixel, int i, out vec3 albedo) {
     ivec2 cell = ivec2(i % grid, i / grid);
-    ivec2 texel = pixel * grid + cell;
-    Point p;
-    p.surface = unpack_sample(texelFetch(samples_a, texel, 0), texelFetch(samples_b, texel, 0).xy);
-    if (texelFetch(window_depth, texel, 0).r >= 1.0) p.surface.object_id = -1;
+    Sample s = sample_at(pixel * grid + cell);
+    albedo = s.object_id < 0 ? vec3(0) : s.albedo;
     vec2 ndc = (vec2(pixel) + (vec2(cell) + 0.5) / float(grid) - shift) / vec2(size) * 2.0 - 1.0;
-    vec3 local = vec3(ndc.x / focal.x, -ndc.y / focal.y, 1.0) * p.surface.depth;
-    p.position = local * axes + origin;
-    p.normal = p.surface.normal;
-    return p;
+    vec3 local = vec3(ndc.x / focal.x, -ndc.y / focal.y, 1.0) * s.depth;
+    return Point(local * axes + origin, s.normal, s.face_normal,
+                 s.albedo * ((1.0 - s.metallic) * (1.0 - s.specular)),
+                 mix(vec3(s.specular), s.albedo, s.metallic), s.alpha * s.alpha, s.depth, s.object_id);
+}
+
+bool alike(Point a, Point b) {
+    return a.object_id == b.object_id && dot(a.face_normal, b.face_normal) > MIN_FACE_COSINE
+        && dot(a.normal, b.normal) > MIN_NORMAL_COSINE
+        && abs(dot(a.position - b.position, a.face_normal)) < PLANE_TOLERANCE * a.depth;
+}
+
+// The samples still `open` that are like the first of them, as one point; they are taken out of `open`.
+Point next_group(ivec2 pixel, inout uint open, out float members, inout vec3 albedo) {
+    vec3 sample_albedo;
+    Point first = point_at(pixel, findLSB(open), sample_albedo);
+    Point mean = first;
+    mean.position = mean.normal = mean.diffuse = mean.f0 = vec3(0);
+    mean.alpha2 = members = 0.0;
+    for (int i = 0; i < grid * grid; ++i) {
+        Point p = point_at(pixel, i, sample_albedo);
+        if ((open & (1u << i)) != 0u && alike(first, p)) {
+            open &= ~(1u << i);
+            members += 1.0;
+            albedo += sample_albedo;
+            mean.position += p.position;
+            mean.normal += p.normal;
+            mean.diffuse += p.diffuse;
+            mean.f0 += p.f0;
+            mean.alpha2 += p.alpha2;
+        }
+    }
+    if (members == 0.0) {           // not even like itself: not a number
+        open &= open - 1u;
+        mean.object_id = -1;
+        members = 1.0;
+    }
+    float share = 1.0 / members;
+    mean.position *= share;
+    mean.normal *= share;
+    mean.diffuse *= share;
+    mean.f0 *= share;
+    mean.alpha2 = min(mean.alpha2 * share + 2.0 * (1.0 - min(length(mean.normal), 1.0)), 1.0);
+    return mean;
 }
 
 // Openness of the nearest-depth neighbours: the blur of the fixed tap pattern stops at edges.
@@ -57,79 +106,45 @@ float openness(ivec2 pixel, float depth) {
 }
 
 vec3 radiance(Point p, ivec2 pixel) {
-    Sample s = p.surface;
     vec3 v = normalize(origin - p.position);
     vec3 n = normalize(p.normal);
-    vec3 f0 = mix(vec3(s.specular), s.albedo, s.metallic);
-    float nv = max(abs(dot(n, v)), 1e-3);
-    vec3 diffuse = s.albedo * ((1.0 - s.metallic) * (1.0 - s.specular) / 3.14159265);
+    float alpha = sqrt(p.alpha2);
+    vec2 share = mirror_share(sqrt(alpha), max(abs(dot(n, v)), 1e-3));
+    // What one bounce between microfacets loses, given back (Turquin 2019).
+    vec3 rebound = 1.0 + p.f0 * (1.0 / max(share.x + share.y, 0.1) - 1.0);
     vec3 sum = vec3(0);
     for (int i = 0; i < light_count; ++i) {
         Light light = lights[i];
         vec3 to_light = light.position.xyz - p.position;
         float distance_m = length(to_light);
         vec3 l = to_light / distance_m;
-        vec3 arrives = arriving(light, l, distance_m) * smoothstep(-0.15, 0.0, dot(s.face_normal, l));
-        float angular = light.position.w / max(distance_m, light.position.w);
-        float alpha = min(sqrt(s.alpha * s.alpha + 0.25 * angular * angular), 1.0);
-        if (dot(p.normal, l) > 0.0 && max(arrives.r, max(arrives.g, arrives.b)) > 0.0) {
-            vec3 f = diffuse * dot(p.normal, l) + reflected(f0, alpha, n, v, l);
-            sum += f * arrives * visibility(light, p.position, s.face_normal);
+        vec3 arrives = arriving(light, l, distance_m) * smoothstep(-0.15, 0.0, dot(p.face_normal, l));
+        float nl = dot(p.normal, l);
+        if (nl > 0.0 && max(arrives.r, max(arrives.g, arrives.b)) > 0.0) {
+            float angular = light.position.w / max(distance_m, light.position.w);
+            float wide = min(sqrt(p.alpha2 + 0.25 * angular * angular), 1.0);
+            vec3 f = p.diffuse * (nl / 3.14159265) + rebound * reflected(p.f0, wide, n, v, l);
+            sum += f * arrives * visibility(light, p.position, p.face_normal);
         }
     }
-    float open = openness(pixel, s.depth);
-    vec2 share = mirror_share(sqrt(s.alpha), nv);
-    vec3 ambient = ambient_light(n) * s.albedo * ((1.0 - s.metallic) * (1.0 - s.specular));
-    vec3 mirror = (f0 * share.x + min(share.y, 50.0 * f0.g)) * mirrored(p.position, reflect(-v, n), s.alpha);
-    return sum + open * (ambient + mirror);
+    vec3 mirror = p.f0 * share.x + min(share.y, 50.0 * max(p.f0.r, max(p.f0.g, p.f0.b)));
+    vec3 surroundings = cube(ambient_sides, n) * p.diffuse + rebound * mirror * mirrored(p.position, reflect(-v, n), alpha);
+    return sum + openness(pixel, p.depth) * surroundings;
 }
 
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     int count = grid * grid;
-    int middle = (grid / 2) * grid + grid / 2;
-    Point first = point_at(pixel, middle);
-    Point mean = first;
-    mean.surface.albedo = vec3(0);
-    mean.surface.alpha = mean.surface.metallic = mean.surface.specular = 0.0;
-    mean.position = mean.normal = vec3(0);
-    bool flat_ = true;
-    for (int i = 0; i < count; ++i) {
-        Point p = point_at(pixel, i);
-        if (p.surface.object_id < 0) { flat_ = false; continue; }
-        mean.surface.albedo += p.surface.albedo;
-        mean.surface.alpha += p.surface.alpha * p.surface.alpha;
-        mean.surface.metallic += p.surface.metallic;
-        mean.surface.specular += p.surface.specular;
-        mean.position += p.position;
-        mean.normal += p.normal;
-        flat_ = flat_ && p.surface.object_id == first.surface.object_id
-            && dot(p.surface.face_normal, first.surface.face_normal) > 0.99
-            && abs(dot(p.position - first.position, first.surface.face_normal)) < PLANE_TOLERANCE * first.surface.depth;
+    uint open = (1u << count) - 1u;
+    vec3 sum = vec3(0), albedo = vec3(0);
+    while (open != 0u) {
+        float members;
+        Point p = next_group(pixel, open, members, albedo);
+        if (p.object_id >= 0) sum += members * radiance(p, pixel);
     }
-    float share = 1.0 / float(count);
-    mean.surface.albedo *= share;
-    mean.normal *= share;
-    float spread = 1.0 - min(length(mean.normal), 1.0);
-    flat_ = flat_ && spread < 0.05;
-
-    vec3 sum = vec3(0);
-    int rounds = flat_ ? 1 : count;
-    for (int i = 0; i < rounds; ++i) {
-        Point p;
-        if (flat_) {
-            p = mean;
-            p.surface.alpha = sqrt(min(p.surface.alpha * share + 2.0 * spread, 1.0));
-            p.surface.metallic *= share;
-            p.surface.specular *= share;
-            p.position *= share;
-        } else {
-            p = point_at(pixel, i);
-        }
-        if (p.surface.object_id >= 0) sum += radiance(p, pixel);
-    }
-    bool hit = first.surface.object_id >= 0;
-    out_radiance = vec4(sum / float(rounds), hit ? first.surface.depth : 0.0);
-    out_albedo = vec4(mean.surface.albedo, hit ? float(first.surface.object_id) : 0.0);
-    out_normal = vec4(hit ? axes * first.surface.normal * vec3(1, 1, -1) : vec3(0, 0, 1), 0.0);
+    Sample middle = sample_at(pixel * grid + grid / 2);
+    bool hit = middle.object_id >= 0;
+    out_radiance = vec4(sum / float(count), hit ? middle.depth : 0.0);
+    out_albedo = vec4(albedo / float(count), hit ? float(middle.object_id) : 0.0);
+    out_normal = vec4(hit ? axes * middle.normal * vec3(1, 1, -1) : vec3(0, 0, 1), 0.0);
 }

@@ -1,6 +1,7 @@
 #version 430 core
 // Share of the surroundings that each pixel sees: scalable ambient obscurance (McGuire et al. 2012) with one
-// fixed spiral of taps for all pixels, at one sample per pixel. Output: openness 0..1, depth (0 = no hit).
+// fixed spiral of taps for all pixels, at one sample per pixel. What the
+// fixed pattern leaves of the outlines of occluders is smoothed by blur.frag. Output: openness 0..1, depth (0 = no hit).
 #include "encoding.glsl"
 layout(binding = 0) uniform usampler2D samples_a;
 layout(binding = 1) uniform usampler2D samples_b;
@@ -9,13 +10,12 @@ uniform int grid;        // samples per pixel and axis
 uniform vec2 focal;      // half image sizes
 uniform ivec2 size;      // pixels
 uniform mat3 axes;       // rows right, up, forward
-const int TAPS = 24;
+const int TAPS = 32;
 uniform vec2 taps[TAPS];
 layout(location = 0) out vec2 result;
 
 const float RADIUS_M = 0.35;
 const float MAX_SCREEN = 0.2;   // of the image width
-const float STRENGTH = 1.0;
 
 vec3 at(ivec2 pixel, out bool hit) {
     ivec2 sample_at = pixel * grid + grid / 2;
@@ -42,5 +42,5 @@ void main() {
         if (other_hit) sum += f * f * f * max(dot(v, n) - floor_m, 0.0) / (vv + 0.0004);
     }
     float covered = sum * 5.0 * RADIUS_M / (r2 * r2 * r2 * float(TAPS));
-    result = vec2(max(1.0 - STRENGTH * covered, 0.1), p.z);
+    result = vec2(max(1.0 - covered, 0.1), p.z);
 }

@@ -1,18 +1,19 @@
 // The room as a light source: see fsid.render.room. Sides in the order +x -x +y -y +z -z.
 layout(binding = 4) uniform sampler2DArray room_radiance;
-uniform vec3 ambient_sides[6];   // radiance that arrives from each side, diffuse
+uniform vec3 ambient_sides[6];   // ambient radiance that arrives from each side
+uniform vec3 mean_sides[6];      // mean of room_radiance over each side
 uniform vec3 room_half;          // half size of the room
 const float ROOM_TEXELS = 16.0;  // per side
 const float ROOM_LEVELS = 4.0;
 
-// Irradiance / pi on a surface with normal n: the ambient cube (McTaggart 2004), weights sum to one.
-vec3 ambient_light(vec3 n) {
+// A value per side as a smooth function of direction: the ambient cube (McTaggart 2004), weights sum to one.
+vec3 cube(vec3 sides[6], vec3 n) {
     vec3 w = n * n;
-    return w.x * ambient_sides[n.x < 0.0 ? 1 : 0] + w.y * ambient_sides[n.y < 0.0 ? 3 : 2] +
-           w.z * ambient_sides[n.z < 0.0 ? 5 : 4];
+    return w.x * sides[n.x < 0.0 ? 1 : 0] + w.y * sides[n.y < 0.0 ? 3 : 2] + w.z * sides[n.z < 0.0 ? 5 : 4];
 }
 
-// What a mirror of roughness alpha at `position` sees in direction r: the wall where the ray meets it.
+// What a mirror of roughness alpha at `position` sees in direction r: the wall where the ray meets it, and
+// the rougher it is the more of whole walls, which blend where the room has edges.
 vec3 mirrored(vec3 position, vec3 r, float alpha) {
     vec3 p = clamp(position - vec3(0, 0, room_half.z), -room_half, room_half);
     vec3 ray = mix(r, vec3(1e-6), lessThan(abs(r), vec3(1e-6)));
@@ -22,7 +23,8 @@ vec3 mirrored(vec3 position, vec3 r, float alpha) {
     vec2 uv = vec2(at[(axis + 1) % 3], at[(axis + 2) % 3]);
     float width = 2.0 * min(room_half.x, min(room_half.y, room_half.z)) / ROOM_TEXELS;
     float level = min(log2(1.0 + 2.0 * alpha * t[axis] / width), ROOM_LEVELS);
-    return textureLod(room_radiance, vec3(uv, 2 * axis + (ray[axis] < 0.0 ? 1 : 0)), level).rgb;
+    vec3 wall = textureLod(room_radiance, vec3(uv, 2 * axis + (ray[axis] < 0.0 ? 1 : 0)), level).rgb;
+    return mix(wall, cube(mean_sides, r), smoothstep(0.0, 0.4, alpha));
 }
 
 // Share of the surroundings that a surface reflects specularly: scale and offset of f0 (Karis 2014,
@@ -30,5 +32,5 @@ vec3 mirrored(vec3 position, vec3 r, float alpha) {
 vec2 mirror_share(float roughness, float nv) {
     vec4 r = roughness * vec4(-1.0, -0.0275, -0.572, 0.022) + vec4(1.0, 0.0425, 1.04, -0.04);
     float a = min(r.x * r.x, exp2(-9.28 * nv)) * r.x + r.y;
-    return vec2(-1.04, 1.04) * a + r.zw;
+    return max(vec2(-1.04, 1.04) * a + r.zw, 0.0);
 }

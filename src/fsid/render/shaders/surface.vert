@@ -14,7 +14,9 @@ out vec3 metric;          // position in the metric space of the object
 out vec3 metric_normal;
 out vec3 from_camera;     // world axes
 out float distance_m;     // along the viewing axis
-flat out uint surface_index;
+// The surface's entry, flat: a table look-up per triangle is cheaper than one per sample.
+flat out vec4 place[3];
+flat out vec4 colour_a, colour_b, colour_c, maps, scale;
 
 void main() {
     Surface s = surfaces[in_surface];
@@ -23,6 +25,11 @@ void main() {
     from_camera = to_world(s, metric) - origin;
     vec3 local = axes * from_camera;
     distance_m = local.z;
-    surface_index = in_surface;
+    place = s.place;
+    colour_a = s.colour_a;
+    colour_b = s.colour_b;
+    colour_c = s.colour_c;
+    maps = s.maps;
+    scale = s.scale;
     gl_Position = vec4(local.xy * focal + shift * local.z, local.z - 2.0 * near, local.z);
 }

@@ -5,7 +5,7 @@ struct Surface {
     vec4 colour_a;   // rgb; w: cosine of the tile's turn
     vec4 colour_b;   // rgb; w: sine
     vec4 colour_c;   // rgb; w: roughness scale
-    vec4 texture_;   // layer, slope scale, specular, object id (as integer bits)
+    vec4 maps;       // layer, slope scale, specular, object id (as integer bits)
 };
 layout(std430, binding = 0) readonly buffer Surfaces { Surface surfaces[]; };
 

@@ -1,0 +1,24 @@
+#version 430 core
+// Openness (r) averaged along one image axis with binomial weights, among pixels of like depth (g).
+layout(binding = 0) uniform sampler2D openness;
+uniform ivec2 direction;
+uniform ivec2 size;
+layout(location = 0) out vec2 result;
+
+const int REACH = 5;
+const float WEIGHTS[REACH + 1] = float[](252.0, 210.0, 120.0, 45.0, 10.0, 1.0);
+const float TOLERANCE = 0.02;   // of the depth, per pixel of distance
+
+void main() {
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    vec2 centre = texelFetch(openness, pixel, 0).xy;
+    float sum = 0.0, total = 0.0;
+    for (int i = -REACH; i <= REACH; ++i) {
+        vec2 o = texelFetch(openness, clamp(pixel + i * direction, ivec2(0), size - 1), 0).xy;
+        float apart = abs(o.y - centre.y) / (TOLERANCE * max(centre.y, 1e-3) * (1.0 + abs(float(i))));
+        float weight = WEIGHTS[abs(i)] * max(1.0 - apart * apart, 0.0);
+        sum += weight * o.x;
+        total += weight;
+    }
+    result = vec2(sum / total, centre.y);
+}

@@ -1,0 +1,153 @@
+"""The same scene gives the same bits: again, after other scenes, in other slots, in another process."""
+
+from __future__ import annotations
+
+import hashlib
+import subprocess
+import sys
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from fsid.assets import MATERIAL_VARIANTS, bake_material, material_families
+from fsid.errors import FsidError
+from fsid.render import Frame, Renderer
+from fsid.render.layers import LayerStore
+from fsid.scene import Scene, SceneConfig, sample
+
+CONFIG = SceneConfig(objects=(6, 8))
+
+
+def scene(seed: int) -> Scene:
+    return sample(CONFIG, seed, width=96, height=64)
+
+
+def fingerprint(frame: Frame) -> str:
+    arrays = (frame.radiance, frame.albedo, frame.normal, frame.depth, frame.object_id)
+    return hashlib.sha256(b"".join(array.tobytes() for array in arrays)).hexdigest()
+
+
+@pytest.fixture
+def renderer() -> Iterator[Renderer]:
+    with Renderer(texture_size=64) as renderer:
+        yield renderer
+
+
+def test_again_and_after_other_scenes(renderer: Renderer) -> None:
+    first = fingerprint(renderer.render(scene(1)))
+    assert fingerprint(renderer.render(scene(1))) == first
+    renderer.render(sample(SceneConfig(objects=(4, 4), lights=5), 2, width=160, height=90))
+    assert fingerprint(renderer.render(scene(3))) != first
+    assert fingerprint(renderer.render(scene(1))) == first
+
+
+def test_slots_of_materials_do_not_matter(renderer: Renderer) -> None:
+    """With room for a few layers only, materials move between slots and are baked again."""
+    first = fingerprint(renderer.render(scene(1)))
+    renderer._layers = LayerStore(renderer._context, 64, budget_bytes=12 * 64 * 64 * 11)
+    for seed in (2, 3):
+        renderer.render(scene(seed))
+    assert fingerprint(renderer.render(scene(1))) == first
+
+
+def test_another_process_renders_the_same(renderer: Renderer) -> None:
+    code = (
+        "from fsid.render import Renderer; from test_render_determinism import *;"
+        "r = Renderer(texture_size=64); print(fingerprint(r.render(scene(1))))"
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", f"import sys; sys.path[:0] = {sys.path!r}; {code}"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert run.stdout.split()[-1] == fingerprint(renderer.render(scene(1)))
+
+
+def test_layers_leave_in_order_of_last_use(renderer: Renderer) -> None:
+    store = LayerStore(renderer._context, 64, budget_bytes=4 * 64 * 64 * 11)
+    baked: list[tuple[str, int]] = []
+
+    def bake(family: str, variant: int, size: int):
+        baked.append((family, variant))
+        return bake_material("paint", 0, size)
+
+    for name in ("a", "b", "c", "d", "a", "e"):
+        store.load([(name, 0)], bake)
+    assert [name for name, _ in baked] == ["a", "b", "c", "d", "e"]
+    store.load([("a", 0), ("b", 0)], bake)
+    assert [name for name, _ in baked][5:] == ["b"]
+    layers = store.load([(str(i), 0) for i in range(9)], bake)
+    assert sorted(layer.index for layer in layers.values()) == list(range(9))
+
+
+def test_a_stored_layer_is_what_was_baked(renderer: Renderer) -> None:
+    """Every mip level of every resident layer survives growth of the arrays."""
+    store = LayerStore(renderer._context, 64)
+    families = [(family, v) for family in material_families()[:6] for v in range(MATERIAL_VARIANTS)]
+    for i in range(1, len(families) + 1):
+        layers = store.load(families[:i], bake_material)
+    masks = np.frombuffer(store._arrays[0].read(), np.uint8).reshape(-1, 64, 64, 4)
+    for key, layer in layers.items():
+        expected = bake_material(*key, 64)
+        np.testing.assert_allclose(masks[layer.index, ..., 0] / 255, expected.mix, atol=0.003)
+        np.testing.assert_allclose(masks[layer.index, ..., 3] / 255, expected.roughness, atol=0.003)
+
+
+def test_memory_does_not_grow(renderer: Renderer) -> None:
+    def resident_mb() -> float:
+        with open("/proc/self/statm") as file:
+            return int(file.read().split()[1]) * 4096 / 1e6
+
+    for _ in range(5):
+        renderer.render(scene(1))
+    before = resident_mb()
+    for _ in range(40):
+        renderer.render(scene(1))
+    assert resident_mb() - before < 10
+
+
+def test_samples_per_pixel_agree_on_average(renderer: Renderer) -> None:
+    """More samples change edges, not the light: the mean of the image stays within 1.5 %."""
+    means = [renderer.render(scene(4)).radiance.mean()]
+    renderer.close()
+    with Renderer(texture_size=64, supersampling=4) as fine:
+        means.append(fine.render(scene(4)).radiance.mean())
+    assert abs(means[0] / means[1] - 1) < 0.015
+
+
+def test_a_second_renderer_is_refused(renderer: Renderer) -> None:
+    with pytest.raises(FsidError, match="already open"):
+        Renderer()
+
+
+def test_a_closed_renderer_says_so(renderer: Renderer) -> None:
+    renderer.close()
+    with pytest.raises(FsidError, match="closed"):
+        renderer.render(scene(1))
+
+
+def test_missing_drivers_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(**settings: object) -> None:
+        raise Exception("libEGL.so.1 not loaded")
+
+    monkeypatch.setattr("moderngl.create_context", fail)
+    with pytest.raises(
+        FsidError, match=r"libegl1 libgl1 libgl1-mesa-dri.*NVIDIA_DRIVER_CAPABILITIES"
+    ) as error:
+        Renderer()
+    assert "\n" not in str(error.value)
+    assert Renderer._active is None
+
+
+def test_an_unknown_device_is_an_error() -> None:
+    with pytest.raises(FsidError, match="device 77"):
+        Renderer(device_index=77)
+
+
+def test_the_driver_is_named(renderer: Renderer) -> None:
+    info = renderer.info
+    assert info.renderer
+    assert info.vendor
+    assert info.version[0] == "4"

@@ -1,0 +1,150 @@
+"""Golden images, 160 x 90: what the laws do not pin down must not change unnoticed.
+
+The references are 8-bit sRGB at an exposure fixed per scene, and the tolerance is what another driver's
+rasterisation of edges and rounding of texture filters may cost: a mean difference of 0.5 % of full scale and
+8 % at the 99.9th percentile after a 3 x 3 average. A failure writes image, reference and difference to
+`test-output/`. To make new references, look at the images there, then run
+
+    FSID_UPDATE_GOLDEN=1 pytest tests/test_render_golden.py
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from scipy.ndimage import uniform_filter
+
+from fsid.assets import MaterialMaps
+from fsid.render import Renderer
+from fsid.render.drawable import Drawable, View, room_drawable
+from fsid.scene.model import Background, Camera, Light, Material, Transform
+from render_scenes import bake_plain, block, grid, plain, point_light, sphere
+
+GOLDEN = Path(__file__).parent / "golden"
+OUTPUT = Path(__file__).resolve().parents[1] / "test-output"
+MEAN_TOLERANCE, PEAK_TOLERANCE = 0.005, 0.08
+CAMERA = Camera((0.1, -2.0, 1.3), (0.0, 0.0, 0.35), (0.05, 0.0, 1.0), 52.0, 160, 90)
+NAMES = ("floor", "ceiling", "wall_north", "wall_south", "wall_east", "wall_west")
+WARM, COOL, DARK = (0.7, 0.35, 0.15), (0.2, 0.35, 0.7), (0.06, 0.06, 0.05)
+
+
+def bake(family: str, variant: int, size: int) -> MaterialMaps:
+    """Closed formulas: checks (mix), dots (pattern), waves (height), rust (metallic and roughness)."""
+    if family in ("plain", "metal"):
+        return bake_plain(family, variant, size)
+    t = (np.arange(size) + 0.5) / size
+    u, v = np.meshgrid(t, t)
+    wave = 0.5 + 0.5 * np.sin(2 * np.pi * 4 * u) * np.sin(2 * np.pi * 4 * v)
+    check = ((np.floor(8 * u) + np.floor(8 * v)) % 2).astype(float)
+    dots = (np.hypot((u * 4) % 1 - 0.5, (v * 4) % 1 - 0.5) < 0.25).astype(float)
+    rust = (wave > 0.6).astype(float)
+    zero = np.zeros_like(u)
+    maps = {
+        "checks": (check, dots, 0.5 + 0.1 * wave, zero + 0.5, zero, zero),
+        "waves": (wave, zero, zero + 0.5, zero + 0.3, wave, zero),
+        "rust": (zero, rust, zero + 0.5, 0.25 + 0.6 * rust, 0.5 - 0.2 * rust, 1 - rust),
+    }[family]
+    return MaterialMaps(*(m.astype(np.float32) for m in maps), relief_m=0.02, tile_m=0.5)
+
+
+def patterned(family: str, *colours: tuple[float, float, float], turn_deg: float = 0.0) -> Material:
+    return Material(family, 0, (colours[0], colours[1], colours[2]), 0.5, turn_deg, 1.0, 1.0)
+
+
+def thing(mesh: object, material: Material, object_id: int, x: float, y: float, z: float = 0.0) -> Drawable:
+    return Drawable(mesh, Transform((x, y, z), (0.0, 0.0, 25.0), (1.0, 1.0, 1.0)), (material,), object_id)  # type: ignore[arg-type]
+
+
+def room_view(lights: tuple[Light, ...], ambient: float, *things: Drawable) -> View:
+    """Things in a room of 4 x 5 x 2.6 m with checked floor and coloured walls."""
+    materials = {name: plain((0.6, 0.6, 0.55)) for name in NAMES}
+    materials["floor"] = patterned("checks", (0.5, 0.45, 0.4), (0.25, 0.2, 0.15), DARK, turn_deg=30.0)
+    materials["wall_north"] = patterned("waves", COOL, (0.5, 0.5, 0.6), DARK)
+    room = room_drawable(Background("room", (4.0, 5.0, 2.6), materials))
+    return View((room, *things), lights, (ambient,) * 3, CAMERA, (4.0, 5.0, 2.6), room.materials)
+
+
+def furniture() -> View:
+    lights = (
+        point_light((1.2, -0.8, 2.0), 3.0, 0.03),
+        Light("spot", (-1.2, -0.9, 1.9), (0.5, 0.4, -0.75), (5.0, 3.5, 2.0), 0.08, 50.0),
+    )
+    return room_view(
+        lights,
+        0.12,
+        thing(block((0.5, 0.4, 0.5)), patterned("waves", WARM, (0.4, 0.2, 0.1), DARK), 0, -0.45, 0.2),
+        thing(sphere(0.3, 64), patterned("checks", WARM, COOL, DARK), 1, 0.35, 0.0, 0.3),
+        thing(block((0.1, 0.1, 0.9)), plain(COOL, roughness=40), 2, 0.1, 0.6),
+    )
+
+
+def metals() -> View:
+    balls = [
+        thing(
+            sphere(0.2, 64),
+            plain((0.95, 0.8, 0.5), roughness=r, family="metal"),
+            i,
+            -0.75 + 0.5 * i,
+            0.0,
+            0.2,
+        )
+        for i, r in enumerate((20, 40, 60, 90))
+    ]
+    slab = thing(
+        block((1.6, 0.1, 0.7)), patterned("rust", (0.8, 0.8, 0.85), DARK, (0.4, 0.15, 0.05)), 9, 0.0, 0.6
+    )
+    return room_view((point_light((0.6, -1.0, 1.8), 3.0, 0.1),), 0.1, *balls, slab)
+
+
+def soft_shadows() -> View:
+    posts = [
+        thing(block((0.06, 0.06, h)), plain(WARM), i, x, -0.1)
+        for i, (x, h) in enumerate(((-0.6, 0.9), (0.5, 0.5)))
+    ]
+    lid = thing(grid(0.5), plain(COOL), 5, 0.0, 0.1, 0.55)
+    lights = tuple(point_light((x, 0.6, 2.2), 2.0, r) for x, r in ((-1.2, 0.02), (0.2, 0.2), (1.3, 0.08)))
+    return room_view(lights, 0.03, *posts, lid)
+
+
+SCENES = {"furniture": (furniture, 1.6), "metals": (metals, 1.6), "soft_shadows": (soft_shadows, 2.2)}
+"""name -> (view, exposure)."""
+
+
+@pytest.fixture(scope="module")
+def renderer() -> Iterator[Renderer]:
+    with Renderer(texture_size=256) as renderer:
+        yield renderer
+
+
+def encoded(radiance: np.ndarray, exposure: float) -> np.ndarray:
+    """sRGB, 0..1."""
+    x = np.clip(radiance * exposure, 0.0, 1.0)
+    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.maximum(x, 1e-9) ** (1 / 2.4) - 0.055)
+
+
+def save(path: Path, image: np.ndarray) -> None:
+    path.parent.mkdir(exist_ok=True)
+    Image.fromarray(np.rint(np.clip(image, 0, 1) * 255).astype(np.uint8)).save(path, optimize=True)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_golden_image(renderer: Renderer, name: str) -> None:
+    make, exposure = SCENES[name]
+    frame = renderer.draw(make(), bake=bake)
+    assert np.isfinite(frame.radiance).all()
+    assert frame.radiance.min() >= 0.0
+    image, path = encoded(frame.radiance, exposure), GOLDEN / f"{name}.png"
+    if os.environ.get("FSID_UPDATE_GOLDEN"):
+        save(path, image)
+    reference = np.asarray(Image.open(path), dtype=float) / 255
+    difference = uniform_filter(np.abs(image - reference), (3, 3, 0))
+    mean, peak = difference.mean(), np.quantile(difference, 0.999)
+    if mean > MEAN_TOLERANCE or peak > PEAK_TOLERANCE:
+        for suffix, picture in (("image", image), ("reference", reference), ("difference", difference * 5)):
+            save(OUTPUT / f"{name}-{suffix}.png", picture)
+        pytest.fail(f"{name}: mean {mean:.4f}, 99.9 % {peak:.4f}; see test-output/{name}-*.png")
