@@ -9,6 +9,7 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
+from scipy.ndimage import gaussian_filter
 
 from fsid.errors import FsidError
 from fsid.evaluate.classical import denoise_classical
@@ -113,6 +114,21 @@ def compare(
     return Comparison(testset, tuple(_rows(testset, methods, figures)), tuple(crops))
 
 
+def detailed_window(srgb: np.ndarray, size_px: int) -> tuple[tuple[slice, slice], float]:
+    """The window of (H, W, 3) with the most detail, and how much it is: mean gradient of the smoothed image.
+
+    Smoothed, so that it shows the edges of things rather than the finest texture, where nobody sees noise.
+    """
+    grey = gaussian_filter(srgb.mean(axis=2), 3.0)
+    detail = np.hypot(*np.gradient(grey))
+    height, width = (min(size_px, edge) for edge in grey.shape)
+    tops = range(0, grey.shape[0] - height + 1, max(1, height // 2))
+    lefts = range(0, grey.shape[1] - width + 1, max(1, width // 2))
+    windows = [np.s_[top : top + height, left : left + width] for top, left in product(tops, lefts)]
+    best = max(windows, key=lambda window: float(detail[window].mean()))
+    return best, float(detail[best].mean())
+
+
 def write_results(rows: Sequence[Row], file: Path) -> None:
     """Write results.json: a list of rows, figures rounded to 1e-4."""
     plain = [
@@ -147,12 +163,7 @@ def _crops(
     psnr_raw: dict[str, float],
     size: int,
 ) -> Crops:
-    """The window with the most detail, where denoisers differ most."""
-    size = min(size, *truth.shape[:2])
-    tops = range(0, truth.shape[0] - size + 1, max(1, size // 2))
-    lefts = range(0, truth.shape[1] - size + 1, max(1, size // 2))
-    top, left = max(product(tops, lefts), key=lambda at: truth[at[0] :, at[1] :][:size, :size].std())
-    window = np.s_[top : top + size, left : left + size]
+    window, _ = detailed_window(truth, size)
     return Crops(
         f"{image.name.partition('-')[2]}, {level}",
         truth[window],

@@ -33,7 +33,15 @@ from fsid.dataset import (
 )
 from fsid.denoise import TrainConfig, load_history, train, train_config
 from fsid.errors import FsidError
-from fsid.evaluate.compare import CLASSICAL, NOISY, Comparison, Method, compare, write_results
+from fsid.evaluate.compare import (
+    CLASSICAL,
+    NOISY,
+    Comparison,
+    Method,
+    compare,
+    detailed_window,
+    write_results,
+)
 from fsid.evaluate.models import model_method
 from fsid.evaluate.plots import loss_plot, noise_profile_plot
 from fsid.evaluate.report import Section, comparison_sections, picture, write_report
@@ -148,35 +156,42 @@ def _samples(data: Path) -> list[tuple[Path, str]]:
 
 
 def _contact_sheet(data: Path) -> np.ndarray:
-    tiles = []
-    for shard, key in _samples(data):
-        with Image.open(io.BytesIO(read_member(shard, f"{key}.rgb.png"))) as image:
-            tiles.append(np.asarray(image.reduce(4)))
-    return grid(tiles)
+    return grid([np.asarray(_preview(shard, key).reduce(4)) for shard, key in _samples(data)])
 
 
 def _overview(out: Path, ours: Method, window_px: int = 180) -> np.ndarray:
     """A scene; then a window of it as clean RAW, noisy RAW and denoised, all developed: (h, w, 3) uint8.
 
-    The pair is the one with the highest ISO; its RAW files are left in `out` to look at.
+    The RAW files of the pair are left in `out`.
     """
-    shard, key = max(
-        _samples(out / "data"), key=lambda at: json.loads(read_member(at[0], f"{at[1]}.json"))["iso"]
-    )
+    shard, key = _pair_to_show(out / "data", window_px)
     for name in ("clean", "noisy"):
         (out / f"pair.{name}.dng").write_bytes(read_member(shard, f"{key}.{name}.dng"))
     clean, noisy = (read_raw(out / f"pair.{name}.dng") for name in ("clean", "noisy"))
-    images = [to_uint8(develop(raw)) for raw in (clean, noisy, ours.denoise(noisy))]
-    height, width = images[0].shape[:2]
-    top, left = (height - window_px) // 2, (width - window_px) // 2
-    scale = max(1, height // window_px)
-    windows = [
-        image[top:, left:][:window_px, :window_px].repeat(scale, 0).repeat(scale, 1) for image in images
-    ]
-    rows = scale * window_px
-    gap = np.full((rows, 8, 3), 255, np.uint8)
-    scene = images[0][(height - rows) // 2 :][:rows]
-    return np.hstack([scene, gap, windows[0], gap, windows[1], gap, windows[2]])
+    scene, *others = (develop(raw) for raw in (clean, noisy, ours.denoise(noisy)))
+    window, _ = detailed_window(scene, window_px)
+    scale = max(1, scene.shape[0] // window_px)
+    windows = [image[window].repeat(scale, 0).repeat(scale, 1) for image in (scene, *others)]
+    rows = len(windows[0])
+    gap = np.ones((rows, 8, 3), np.float32)
+    top = (len(scene) - rows) // 2
+    return to_uint8(np.hstack([scene[top : top + rows], gap, windows[0], gap, windows[1], gap, windows[2]]))
+
+
+def _pair_to_show(data: Path, window_px: int) -> tuple[Path, str]:
+    """Of the eight noisiest pairs the one with the most detail."""
+
+    def iso(sample: tuple[Path, str]) -> float:
+        return json.loads(read_member(sample[0], f"{sample[1]}.json"))["iso"]
+
+    def detail(sample: tuple[Path, str]) -> float:
+        return detailed_window(np.asarray(_preview(*sample)) / 255, window_px)[1]
+
+    return max(sorted(_samples(data), key=iso)[-8:], key=detail)
+
+
+def _preview(shard: Path, key: str) -> Image.Image:
+    return Image.open(io.BytesIO(read_member(shard, f"{key}.rgb.png")))
 
 
 def _real_raw_section(ours: Method) -> list[Section]:
