@@ -10,6 +10,7 @@ from fsid.sensor.develop import develop, develop_linear
 from fsid.sensor.dng import dng_pixel_offset, read_raw, write_dng
 from fsid.sensor.exposure import expose, exposure_rand
 from fsid.sensor.frames import Layout
+from fsid.sensor.light import LightLevel, dimmed, light_level
 from fsid.sensor.mosaic import bayer_crop, bayer_flip, mosaic, pack, unpack
 from fsid.sensor.noise import add_noise, level_rand, variance
 from fsid.sensor.pairs import clean_from_frame, clean_from_linear, clean_from_photo, noisy_from_clean
@@ -26,6 +27,7 @@ __all__ = [
     "Calibration",
     "CameraProfile",
     "Layout",
+    "LightLevel",
     "NoiseFit",
     "NoiseLevel",
     "NoiseTerms",
@@ -45,12 +47,14 @@ __all__ = [
     "demosaic",
     "develop",
     "develop_linear",
+    "dimmed",
     "dng_pixel_offset",
     "expose",
     "exposure_rand",
     "fit_noise",
     "from_dn",
     "level_rand",
+    "light_level",
     "linear_to_camera",
     "load_profile",
     "mosaic",

@@ -34,6 +34,20 @@ class Measurement:
 
 
 @dataclass(frozen=True)
+class Optics:
+    """What decides how many electrons a lux makes; see `light` for the assumed defaults.
+
+    pixel_pitch_um: of the stored pixel, that is after binning. quantum_efficiency: electrons per photon of
+    400-700 nm at a green pixel, filter included.
+    """
+
+    f_number: float
+    pixel_pitch_um: float
+    quantum_efficiency: float = 0.28
+    transmittance: float = 0.9
+
+
+@dataclass(frozen=True)
 class CameraProfile:
     """One camera.
 
@@ -42,6 +56,7 @@ class CameraProfile:
     sigma2 may be impossible here, but not in what `level` returns.
     xyz_to_camera: (m, 3, 3) matrices for D65 (DNG `ColorMatrix1`); `colour.colour_rand` blends them.
     date: of the data. measured: None where the source states no errors. terms: beyond the paper's model.
+    optics: None where unknown.
     """
 
     name: str
@@ -59,6 +74,7 @@ class CameraProfile:
     date: str = ""
     measured: Measurement | None = None
     terms: NoiseTerms = PAPER
+    optics: Optics | None = None
 
     @property
     def span(self) -> int:

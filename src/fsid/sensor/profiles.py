@@ -23,7 +23,7 @@ import yaml
 from numpy.polynomial.polynomial import polyval
 
 from fsid.errors import FsidError
-from fsid.sensor.camera_profile import MONO, CameraProfile, Measurement
+from fsid.sensor.camera_profile import MONO, CameraProfile, Measurement, Optics
 from fsid.sensor.colour import published_matrices
 from fsid.sensor.iso_law import k_law, sigma2_law
 from fsid.sensor.mosaic import check_cfa
@@ -31,7 +31,7 @@ from fsid.sensor.quantise import ROUNDING_DN2
 from fsid.sensor.terms import PAPER, NoiseTerms, parse_terms
 
 _REQUIRED = {"name", "camera", "cfa", "bits", "black_level", "white_level", "levels"}
-_OPTIONAL = {"source", "notes", "date", "xyz_to_camera", "law", "terms"}
+_OPTIONAL = {"source", "notes", "date", "xyz_to_camera", "law", "terms", "optics"}
 _MEASURED = {"k_error", "sigma2_error", "black", "frames", "dark_frames"}
 _DN_TOLERANCE = 0.01  # k_dn and sigma2_dn repeat k and sigma2; they may differ by rounding only
 
@@ -58,6 +58,8 @@ def save_profile(path: str | Path, profile: CameraProfile) -> None:
     data |= {"xyz_to_camera": profile.xyz_to_camera.tolist()}
     if profile.terms != PAPER:
         data["terms"] = _switched_on(profile.terms)
+    if profile.optics is not None:
+        data["optics"] = asdict(profile.optics)
     if profile.measured is not None and len(profile.iso) > 1:
         data["law"] = _law(profile)
     data["levels"] = [_level(profile, row) for row in range(len(profile.iso))]
@@ -159,6 +161,7 @@ def _parse(text: str, where: str) -> CameraProfile:
         date=str(data.get("date", "")),
         measured=_measurement(data["levels"], where),
         terms=parse_terms(data.get("terms", {}), f"{where}: terms"),
+        optics=_optics(data["optics"], f"{where}: optics") if "optics" in data else None,
     )
 
 
@@ -193,6 +196,14 @@ def _measurement(entries: list[dict[str, Any]], where: str) -> Measurement | Non
             table[key].append(int(_number(entry[key], f"{here}.{key}")))
     arrays = {key: np.array(table[key]) for key in ("k_error", "sigma2_error", "black")}
     return Measurement(**arrays, frames=tuple(table["frames"]), dark_frames=tuple(table["dark_frames"]))
+
+
+def _optics(data: Any, where: str) -> Optics:
+    _check_keys(data, where, {"f_number", "pixel_pitch_um"}, {"quantum_efficiency", "transmittance"})
+    values = {key: _number(value, f"{where}.{key}") for key, value in data.items()}
+    if min(values.values()) <= 0:
+        raise FsidError(f"{where}: every value must be positive")
+    return Optics(**values)
 
 
 def _site_values(entry: dict[str, Any], key: str, where: str, unit: float) -> list[float]:

@@ -1,0 +1,72 @@
+"""Lux become electrons by radiometry, and electrons become a signal by the profile's own gain."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fsid.errors import FsidError
+from fsid.sensor import Raw, dimmed, light_level, load_profile, save_profile
+from fsid.sensor.light import KEY, PHOTONS_PER_LUX_M2_S, electrons_per_second
+
+PIXEL = load_profile("pixel6")
+
+
+def test_photons_of_a_lux_lie_between_green_light_and_the_sun():
+    """Monochromatic 555 nm light has the fewest photons per lux: 1 / (683 lm/W * h c / 555 nm)."""
+    green = 1 / (683 * 6.62607e-34 * 2.99792e8 / 555e-9)
+    assert green < PHOTONS_PER_LUX_M2_S < 4 * green
+
+
+def test_electrons_by_hand():
+    """1000 lux on a grey card: 1000 * 0.18 * 0.9 / (4 * 1.85^2) lux on the sensor, 5.76 um^2, QE 0.28."""
+    on_sensor = 1000 * 0.18 * 0.9 / (4 * 1.85**2)
+    by_hand = on_sensor * 1.115e16 * 5.76e-12 * 0.28
+    assert electrons_per_second(PIXEL, 1000) == pytest.approx(by_hand, rel=1e-3)
+
+
+def test_time_comes_before_iso_and_iso_before_darkness():
+    lux = np.geomspace(0.01, 30000, 40)
+    levels = [light_level(PIXEL, value) for value in lux]
+    times, isos, signals = (
+        np.array([getattr(v, n) for v in levels]) for n in ("exposure_s", "iso", "signal")
+    )
+    assert np.all(np.diff(times) <= 0)
+    assert np.all(np.diff(isos) <= 1e-9)
+    assert np.all(np.diff(signals) >= -1e-9)
+    assert np.all((isos < 49.01) | (times == 0.1))
+    assert np.all((signals > KEY * 0.999) | (isos > 4 * 3199 * 0.999))
+    assert levels[-1].dimming == pytest.approx(1)
+
+
+def test_half_a_lux_with_a_pixel_6():
+    level = light_level(PIXEL, 0.5)
+    assert level.exposure_s == 0.1
+    assert 5 < level.electrons < 20
+    assert level.iso == pytest.approx(4 * 3199)
+    k = PIXEL.level(level.iso).k
+    assert level.signal == pytest.approx(level.electrons * (k[1] + k[2]) / 2)
+    half = light_level(PIXEL, 0.5, longest_exposure_s=0.05)
+    assert half.electrons == pytest.approx(level.electrons / 2)
+
+
+def test_a_dimmed_image_has_the_electrons_of_its_light():
+    level = light_level(PIXEL, 0.1)
+    raw = Raw(np.full((4, 4), KEY, np.float32), "GBRG", 64, 1023, (2, 1, 1.5), np.eye(3))
+    np.testing.assert_allclose(dimmed(raw, level).mosaic, level.signal, rtol=1e-6)
+    assert dimmed(raw, level).iso == level.iso
+
+
+def test_what_cannot_be_computed_is_named(tmp_path):
+    with pytest.raises(FsidError, match=r"galaxy-s20-fe.*optics"):
+        light_level(load_profile("galaxy-s20-fe"), 1)
+    with pytest.raises(FsidError, match="lux"):
+        light_level(PIXEL, 0)
+    save_profile(tmp_path / "p.yaml", PIXEL)
+    assert load_profile(tmp_path / "p.yaml").optics == PIXEL.optics
+    text = (tmp_path / "p.yaml").read_text()
+    (tmp_path / "bad.yaml").write_text(text.replace("f_number: 1.85", "f_number: -1"))
+    with pytest.raises(FsidError, match=r"bad\.yaml: optics"):
+        load_profile(tmp_path / "bad.yaml")
+    with pytest.raises(FsidError, match="optics"):
+        light_level(replace(PIXEL, optics=None), 1)
