@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from fsid.errors import FsidError
-from fsid.sensor import Raw, dimmed, light_level, load_profile, save_profile
+from fsid.evaluate import photo_testset
+from fsid.sensor import Raw, dimmed, light_level, load_profile, read_raw, save_profile
 from fsid.sensor.light import KEY, PHOTONS_PER_LUX_M2_S, electrons_per_second
 
 PIXEL = load_profile("pixel6")
@@ -55,6 +56,14 @@ def test_a_dimmed_image_has_the_electrons_of_its_light():
     raw = Raw(np.full((4, 4), KEY, np.float32), "GBRG", 64, 1023, (2, 1, 1.5), np.eye(3))
     np.testing.assert_allclose(dimmed(raw, level).mosaic, level.signal, rtol=1e-6)
     assert dimmed(raw, level).iso == level.iso
+
+
+def test_the_test_bench_takes_lux(photos, tmp_path):
+    testset = photo_testset([photos], tmp_path, camera="pixel6", isos=[800], luxes=[0.5])
+    assert testset.levels == ("iso800", "0.5lux")
+    capture = read_raw(tmp_path / testset.images[0].name / "0.5lux.noisy.dng")
+    grey_electrons = KEY / np.mean(PIXEL.level(capture.iso).k[1:3])
+    assert grey_electrons == pytest.approx(light_level(PIXEL, 0.5).electrons, rel=1e-3)
 
 
 def test_what_cannot_be_computed_is_named(tmp_path):

@@ -18,6 +18,7 @@ def testset(
     output: Output,
     camera: str = "pixel6",
     iso: tuple[int, ...] = (800, 1600, 3200, 6400),
+    lux: tuple[float, ...] = (),
     seed: int = 0,
     quiet: bool = False,
 ) -> None:
@@ -29,6 +30,7 @@ def testset(
         output: Folder of the test set.
         camera: Noise profile, a built-in name (fsid profiles) or a file.
         iso: ISO of each light level.
+        lux: Light levels in lux: auto-exposure of the camera (exposures up to 1/10 s) makes them ISOs.
         seed: Seed of white balance, colour matrix and noise.
         quiet: No progress bar.
     """
@@ -38,4 +40,4 @@ def testset(
     if not folders:
         raise FsidError("fsid testset photos: name at least one folder of photographs")
     with progress_bar("photographs", "photographs", quiet=quiet) as progress:
-        photo_testset(folders, output, camera=camera, isos=iso, seed=seed, progress=progress)
+        photo_testset(folders, output, camera=camera, isos=iso, luxes=lux, seed=seed, progress=progress)

@@ -19,7 +19,14 @@ import numpy as np
 from fsid.config import from_plain, to_plain
 from fsid.dataset import find_photos, read_photo
 from fsid.errors import FsidError
-from fsid.sensor import clean_from_photo, clean_levels, load_profile, noisy_from_clean, write_dng
+from fsid.sensor import (
+    clean_from_photo,
+    clean_levels,
+    light_level,
+    load_profile,
+    noisy_from_clean,
+    write_dng,
+)
 
 
 @dataclass(frozen=True)
@@ -76,16 +83,22 @@ def photo_testset(
     *,
     camera: str,
     isos: Sequence[int],
+    luxes: Sequence[float] = (),
     seed: int = 0,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> TestSet:
-    """Push photographs through a named camera: unprocess, mosaic, and one capture per ISO.
+    """Push photographs through a named camera: unprocess, mosaic, and one capture per ISO and light level.
+
+    luxes: light levels; the camera's auto-exposure (`sensor.light`) makes them ISOs, beyond its highest too,
+    where a phone brightens digitally.
 
     The set of an image is the name of its folder. Photograph i draws from SeedSequence(seed, spawn_key=(i,)).
     """
     profile = load_profile(camera)
-    if not isos or min(isos) <= 0:
-        raise FsidError("--iso: at least one positive ISO is needed")
+    if not (isos or luxes) or min((*isos, *luxes)) <= 0:
+        raise FsidError("--iso: at least one positive ISO (or --lux) is needed")
+    levels = {f"iso{iso}": float(iso) for iso in isos}
+    levels |= {f"{lux:g}lux": light_level(profile, lux, highest_iso=np.inf).iso for lux in luxes}
     if (out / "testset.json").exists():
         raise FsidError(f"{out}: already holds a test set; use another folder")
     photos = [(folder.name, path) for folder in folders for path in find_photos(folder)]
@@ -97,16 +110,16 @@ def photo_testset(
         try:
             (out / image.name).mkdir(parents=True, exist_ok=True)
             write_dng(out / image.name / "clean.dng", clean_levels(clean))
-            for iso in isos:
+            for name, iso in levels.items():
                 noisy = noisy_from_clean(rng, clean, iso, profile.level(iso), profile.terms)
-                write_dng(out / image.name / f"iso{iso}.noisy.dng", noisy)
+                write_dng(out / image.name / f"{name}.noisy.dng", noisy)
         except OSError as error:
             raise FsidError(f"{out}: cannot be written ({error.strerror})") from None
         images.append(image)
         progress(i + 1, len(photos))
     testset = TestSet(
         camera=profile.name,
-        levels=tuple(f"iso{iso}" for iso in isos),
+        levels=tuple(levels),
         images=tuple(images),
         seed=seed,
         notes="photographs unprocessed to RAW (Brooks et al. 2019), noise from the camera's profile",

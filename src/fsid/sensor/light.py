@@ -95,7 +95,8 @@ def _gain(profile: CameraProfile, iso: float) -> float:
 
 
 def _iso_of_gain(profile: CameraProfile, gain: float, low: float, high: float) -> float:
-    """The ISO in low..high whose gain is nearest to `gain`; k rises with ISO."""
+    """The ISO in low..high whose gain is nearest to `gain`; k rises with ISO, at last in proportion."""
+    high = min(high, 1e9)
     for _ in range(_HALVINGS):
         middle = (low * high) ** 0.5
         low, high = (middle, high) if _gain(profile, middle) < gain else (low, middle)
