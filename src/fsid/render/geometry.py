@@ -41,13 +41,15 @@ SURFACE = np.dtype(
 
 @dataclass(frozen=True)
 class Geometry:
-    """vertices: VERTEX (V,). indices: (3 F,) uint32, drawable after drawable. surfaces: SURFACE (P,).
+    """vertices: VERTEX (V,), in the object. world: (V, 3) float32, the same points in the world.
 
-    ranges: (N, 2) first index and number of indices of each drawable.
-    spheres: (N, 4) world centre and radius. casters: (N,) bool, which drawables cast a shadow.
+    indices: (3 F,) uint32, drawable after drawable. surfaces: SURFACE (P,). ranges: (N, 2) first index and
+    number of indices of each drawable. spheres: (N, 4) world centre and radius of each drawable.
+    casters: (N,) bool, which drawables cast a shadow.
     """
 
     vertices: np.ndarray
+    world: np.ndarray
     indices: np.ndarray
     surfaces: np.ndarray
     ranges: np.ndarray
@@ -57,11 +59,12 @@ class Geometry:
 
 def merge(drawables: Sequence[Drawable], layer_of: Callable[[Material], Layer]) -> Geometry:
     """One geometry of all drawables; `layer_of` tells where a material's maps are."""
-    vertices, indices, surfaces, ranges, spheres = [], [], [], [], []
+    vertices, world, indices, surfaces, ranges, spheres = [], [], [], [], [], []
     first_vertex = first_index = first_surface = 0
     for drawable in drawables:
         mesh_vertices, mesh_indices = _with_surfaces(drawable.mesh, first_surface)
         vertices.append(mesh_vertices)
+        world.append(_in_world(mesh_vertices["position"], drawable.transform))
         indices.append(mesh_indices + np.uint32(first_vertex))
         surfaces += [_surface(drawable, material, layer_of(material)) for material in drawable.materials]
         ranges.append((first_index, len(mesh_indices)))
@@ -71,6 +74,7 @@ def merge(drawables: Sequence[Drawable], layer_of: Callable[[Material], Layer]) 
         first_surface += len(drawable.materials)
     return Geometry(
         vertices=np.concatenate(vertices),
+        world=np.concatenate(world),
         indices=np.concatenate(indices),
         surfaces=np.stack(surfaces),
         ranges=np.array(ranges, np.uint32),
@@ -116,6 +120,12 @@ def _with_surfaces(mesh: Mesh, first_surface: int) -> tuple[np.ndarray, np.ndarr
     vertices["normal"] = mesh.normals[index]
     vertices["surface"] = part + first_surface
     return vertices, faces.astype(np.uint32).ravel()
+
+
+def _in_world(points: np.ndarray, transform: Transform) -> np.ndarray:
+    """(V, 3) float32: rotation (points * scale) + position."""
+    matrix = (rotation_matrix(*transform.rotation_deg) * transform.scale).astype(np.float32)
+    return points @ matrix.T + np.array(transform.position_m, np.float32)
 
 
 def _surface(drawable: Drawable, material: Material, layer: Layer) -> np.ndarray:

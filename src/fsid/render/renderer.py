@@ -220,9 +220,10 @@ class _Buffers:
 
     def __init__(self, context: moderngl.Context, geometry: Geometry, plan: ShadowPlan, room: Room) -> None:
         self._context = context
+        self._world = context.buffer(geometry.world.tobytes())
         self._vertices = context.buffer(geometry.vertices.tobytes())
         self._indices = context.buffer(geometry.indices.tobytes())
-        self._owned: list[Any] = [self._vertices, self._indices]
+        self._owned: list[Any] = [self._world, self._vertices, self._indices]
         for binding, table in enumerate((geometry.surfaces, plan.table)):
             buffer = context.buffer(table.tobytes())
             buffer.bind_to_storage_buffer(binding)
@@ -238,11 +239,11 @@ class _Buffers:
         self._owned.append(self.room)
 
     def vertex_array(self, program: moderngl.Program) -> moderngl.VertexArray:
-        """The geometry as input of a program, with or without normals."""
-        with_normals = "in_normal" in program
-        layout = "3f 3f 1u" if with_normals else "3f 12x 1u"
-        names = ("in_position", "in_normal", "in_surface") if with_normals else ("in_position", "in_surface")
-        array = self._context.vertex_array(program, [(self._vertices, layout, *names)], self._indices)
+        """The geometry as input of a program: positions in the world, and the rest where it is asked for."""
+        content: list[tuple[Any, ...]] = [(self._world, "3f", "in_world")]
+        if "in_surface" in program:
+            content.append((self._vertices, "3f 3f 1u", "in_position", "in_normal", "in_surface"))
+        array = self._context.vertex_array(program, content, self._indices)
         self._owned.append(array)
         return array
 

@@ -1,8 +1,6 @@
 #version 430 core
 // Depth only, for the prepass and the shadow maps: rows of `axes` are right, up, forward.
-#include "surfaces.glsl"
-in vec3 in_position;
-in uint in_surface;
+in vec3 in_world;
 uniform vec3 origin;
 uniform mat3 axes;
 uniform vec2 focal;
@@ -11,7 +9,6 @@ uniform float near;
 invariant gl_Position;
 
 void main() {
-    Surface s = surfaces[in_surface];
-    vec3 local = axes * (to_world(s, to_metric(s, in_position)) - origin);
+    vec3 local = axes * (in_world - origin);
     gl_Position = vec4(local.xy * focal + shift * local.z, local.z - 2.0 * near, local.z);
 }

@@ -1,6 +1,7 @@
 #version 430 core
 // As depth.vert, with what the surface shader needs; gl_Position must be the same to the bit.
 #include "surfaces.glsl"
+in vec3 in_world;
 in vec3 in_position;
 in vec3 in_normal;
 in uint in_surface;
@@ -10,7 +11,7 @@ uniform vec2 focal;
 uniform vec2 shift;
 uniform float near;
 invariant gl_Position;
-out vec3 metric;          // position in the metric space of the object
+out vec3 metric;          // metric space of the object: scaled, not turned; textures live here
 out vec3 metric_normal;
 out vec3 from_camera;     // world axes
 out float distance_m;     // along the viewing axis
@@ -20,9 +21,9 @@ flat out vec4 colour_a, colour_b, colour_c, maps, scale;
 
 void main() {
     Surface s = surfaces[in_surface];
-    metric = to_metric(s, in_position);
+    metric = in_position * s.scale.xyz;
     metric_normal = in_normal / s.scale.xyz;
-    from_camera = to_world(s, metric) - origin;
+    from_camera = in_world - origin;
     vec3 local = axes * from_camera;
     distance_m = local.z;
     place = s.place;
