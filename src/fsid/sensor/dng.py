@@ -21,6 +21,7 @@ import rawpy
 from fsid.errors import FsidError
 from fsid.sensor import dng_tags
 from fsid.sensor.colour import published_matrices
+from fsid.sensor.metadata import Metadata, kept_metadata, libraw_metadata
 from fsid.sensor.mosaic import CFA_PATTERNS, site_offsets
 from fsid.sensor.quantise import from_dn, to_dn
 from fsid.sensor.raw import Raw
@@ -35,6 +36,7 @@ from fsid.sensor.tiff import (
     TILE_OFFSETS,
     TILE_SIZES,
     Directory,
+    Tag,
     Values,
     image_tags,
     read_directories,
@@ -70,9 +72,9 @@ def dng_pixel_offset(dng: str | Path | BinaryIO) -> int:
         with Path(dng).open("rb") as file:
             return dng_pixel_offset(file)
     offsets = _mosaic_directory(read_directories(dng)).get(STRIP_OFFSETS)
-    if not offsets:
+    if offsets is None:
         raise FsidError(f"{getattr(dng, 'name', 'DNG')}: not a DNG file that FSID wrote")
-    return int(offsets[0])
+    return int(offsets.values[0])
 
 
 @dataclass(frozen=True)
@@ -87,7 +89,8 @@ class RawHeader:
 
 def read_header(path: str | Path) -> RawHeader:
     """Camera, ISO, exposure time and date of a RAW file, without its pixels. Errors as in `read_raw`."""
-    with _opened(Path(path)) as (file, tags):
+    with _opened(Path(path)) as (file, source):
+        tags = source.values
         other = getattr(file, "other", None)  # rawpy 0.25 and later
         return RawHeader(
             camera=dng_tags.camera_name(tags),
@@ -105,19 +108,19 @@ def read_raw(path: str | Path) -> Raw:
     FsidError: missing, truncated, no RAW, not Bayer (X-Trans, Foveon, linear DNG, monochrome).
     """
     path = Path(path)
-    with _opened(path) as (file, tags):
-        return _from_libraw(file, tags, path)
+    with _opened(path) as (file, source):
+        return _from_libraw(file, source, path)
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[tuple[rawpy.RawPy, dict[int, Values]]]:
+def _opened(path: Path) -> Iterator[tuple[rawpy.RawPy, _Source]]:
     """LibRaw's view of a file and its TIFF tags; whatever LibRaw refuses becomes one line."""
     if not path.is_file():
         raise FsidError(f"{path}: no such RAW file")
-    tags = _read_tags(path)
+    source = _read_source(path)
     try:
         with rawpy.imread(str(path)) as file:
-            yield file, tags
+            yield file, source
     except (rawpy.LibRawError, rawpy.NotSupportedError) as error:
         reason = error.args[0].decode() if error.args and isinstance(error.args[0], bytes) else error
         raise FsidError(f"{path}: not a RAW file that LibRaw can read ({reason})") from error
@@ -137,28 +140,36 @@ def _dng_bytes(raw: Raw, preview: np.ndarray | None) -> bytes:
     return tiff_bytes(Directory(first, preview, (mosaic, *exif)))
 
 
-def _mosaic_directory(directories: list[dict[int, Values]]) -> dict[int, Values]:
+@dataclass(frozen=True)
+class _Source:
+    """Tags of a TIFF-based RAW, those of the mosaic's own directory foremost; nothing for other formats."""
+
+    values: dict[int, Values]
+    metadata: Metadata | None
+
+
+def _mosaic_directory(directories: list[dict[int, Tag]]) -> dict[int, Tag]:
     """The directory that describes the CFA image, {} where none does."""
-    return next((d for d in directories if d.get(PHOTOMETRIC) == (CFA,)), {})
+    return next((d for d in directories if PHOTOMETRIC in d and d[PHOTOMETRIC].values == (CFA,)), {})
 
 
-def _read_tags(path: Path) -> dict[int, Values]:
-    """Tags of a TIFF-based RAW, those of the mosaic's own directory foremost; {} for other formats."""
+def _read_source(path: Path) -> _Source:
     with path.open("rb") as file:
         directories = read_directories(file)
     mosaic = _mosaic_directory(directories)
     size = path.stat().st_size
     for offsets, sizes in ((STRIP_OFFSETS, STRIP_SIZES), (TILE_OFFSETS, TILE_SIZES)):
-        ends = (o + n for o, n in zip(mosaic.get(offsets, ()), mosaic.get(sizes, ()), strict=False))
-        if max(ends, default=0) > size:
+        places, lengths = (mosaic[code].values if code in mosaic else () for code in (offsets, sizes))
+        if max((o + n for o, n in zip(places, lengths, strict=False)), default=0) > size:
             raise FsidError(f"{path}: truncated, its pixels go on after byte {size}; copy it again")
-    tags: dict[int, Values] = {}
+    values: dict[int, Values] = {}
     for directory in (*directories, mosaic):
-        tags |= directory
-    return tags
+        values |= {code: tag.values for code, tag in directory.items()}
+    return _Source(values, kept_metadata(directories, mosaic) if directories else None)
 
 
-def _from_libraw(file: rawpy.RawPy, tags: dict[int, Values], path: Path) -> Raw:
+def _from_libraw(file: rawpy.RawPy, source: _Source, path: Path) -> Raw:
+    tags = source.values
     cfa = _cfa(file, path)
     tile = file.raw_colors_visible[:2, :2]
     dn = file.raw_image_visible
@@ -182,6 +193,7 @@ def _from_libraw(file: rawpy.RawPy, tags: dict[int, Values], path: Path) -> Raw:
         camera=dng_tags.camera_name(tags),
         iso=_iso(file, tags),
         noise=dng_tags.noise_level(tags),
+        metadata=source.metadata or libraw_metadata(file),
     )
 
 

@@ -12,19 +12,19 @@ from __future__ import annotations
 
 import json
 import re
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
+from fsid.sensor.metadata import COLOUR_MATRICES, EXPOSURE_TIME, ORIENTATION, merged
 from fsid.sensor.raw import NoiseLevel, Raw
-from fsid.sensor.tiff import ASCII, BYTE, DOUBLE, LONG, RATIONAL, SHORT, SRATIONAL, Tag, Values
+from fsid.sensor.tiff import ASCII, BYTE, DOUBLE, LONG, RATIONAL, SHORT, SRATIONAL, Tag, Values, rationals
 
 Tags = dict[int, Values]
 
-MAKE, MODEL, ORIENTATION = 271, 272, 274
+MAKE, MODEL = 271, 272
 CFA_REPEAT, CFA_PATTERN = 33421, 33422
-EXPOSURE_TIME, EXIF_ISO, DATE_TAKEN = 33434, 34855, 36867
+EXIF_ISO, DATE_TAKEN = 34855, 36867
 DNG_VERSION, DNG_BACKWARD_VERSION, UNIQUE_CAMERA_MODEL = 50706, 50707, 50708
 CFA_PLANE_COLOUR, CFA_LAYOUT, BLACK_LEVEL, WHITE_LEVEL = 50710, 50711, 50714, 50717
 COLOUR_MATRIX_1, COLOUR_MATRIX_2, AS_SHOT_NEUTRAL, PRIVATE_DATA = 50721, 50722, 50728, 50740
@@ -34,11 +34,27 @@ D65 = 21  # EXIF LightSource
 MAX_EXIF_ISO = 65535
 
 _OWNER = b"FSID\0"
-_DENOMINATOR = 1_000_000  # of rationals: numbers return within 1e-11 of themselves
 
 
 def camera_tags(raw: Raw) -> tuple[Tag, ...]:
-    """Tags of the file's first directory: what camera, what colour, what light."""
+    """Tags of the file's first directory: what camera, what colour, what light.
+
+    What the source said of its camera stays, as long as `raw` still says the same: its name, and the matrix
+    that was read from those of several illuminants.
+    """
+    kept = {tag.code: tag for tag in raw.metadata.first}
+    said = {code: tag.values for code, tag in kept.items()}
+    read = d65_matrix(said)
+    if read is None or not np.array_equal(read, raw.xyz_to_camera):
+        kept = {code: tag for code, tag in kept.items() if code not in COLOUR_MATRICES}
+    if raw.camera != camera_name(said):
+        kept = {code: tag for code, tag in kept.items() if code not in (MAKE, MODEL, UNIQUE_CAMERA_MODEL)}
+    matrices = COLOUR_MATRICES if COLOUR_MATRIX_1 in kept else frozenset()
+    own = (tag for tag in _own_camera_tags(raw) if tag.code not in kept and tag.code not in matrices)
+    return merged((*own, *kept.values()), (Tag(ORIENTATION, SHORT, (1,)),))
+
+
+def _own_camera_tags(raw: Raw) -> tuple[Tag, ...]:
     camera = raw.camera.encode("ascii", "replace").strip() or b"unknown"
     make, _, model = camera.partition(b" ")
     return (
@@ -47,17 +63,16 @@ def camera_tags(raw: Raw) -> tuple[Tag, ...]:
         Tag(UNIQUE_CAMERA_MODEL, ASCII, camera + b"\0"),
         Tag(MAKE, ASCII, make + b"\0"),
         Tag(MODEL, ASCII, (model or make) + b"\0"),
-        Tag(ORIENTATION, SHORT, (1,)),
-        Tag(COLOUR_MATRIX_1, SRATIONAL, _rationals(np.ravel(raw.xyz_to_camera))),
+        Tag(COLOUR_MATRIX_1, SRATIONAL, rationals(np.ravel(raw.xyz_to_camera))),
         Tag(ILLUMINANT_1, SHORT, (D65,)),
-        Tag(AS_SHOT_NEUTRAL, RATIONAL, _rationals([1 / gain for gain in raw.white_balance])),
+        Tag(AS_SHOT_NEUTRAL, RATIONAL, rationals([1 / gain for gain in raw.white_balance])),
         Tag(PRIVATE_DATA, BYTE, _private_data(raw)),
     )
 
 
 def mosaic_tags(raw: Raw) -> tuple[Tag, ...]:
     """Tags of the directory that holds the mosaic: filter pattern, levels, noise."""
-    tags = (
+    tags: tuple[Tag, ...] = (
         Tag(CFA_REPEAT, SHORT, (2, 2)),
         Tag(CFA_PATTERN, BYTE, bytes("RGB".index(colour) for colour in raw.cfa)),
         Tag(CFA_PLANE_COLOUR, BYTE, bytes((0, 1, 2))),
@@ -65,13 +80,15 @@ def mosaic_tags(raw: Raw) -> tuple[Tag, ...]:
         Tag(BLACK_LEVEL, LONG, (raw.black_level,)),
         Tag(WHITE_LEVEL, LONG, (raw.white_level,)),
     )
-    return tags if raw.noise is None else (*tags, Tag(NOISE_PROFILE, DOUBLE, noise_profile(raw.noise)))
+    if raw.noise is not None:
+        tags += (Tag(NOISE_PROFILE, DOUBLE, noise_profile(raw.noise)),)
+    return merged(tags, raw.metadata.mosaic)
 
 
 def exif_tags(raw: Raw) -> tuple[Tag, ...]:
-    """Tags of the EXIF directory: the ISO, rounded to the integer that the tag holds; none if unknown."""
+    """Tags of the EXIF directory: what the source said, and the ISO as the integer that the tag holds."""
     iso = round(min(raw.iso, MAX_EXIF_ISO))
-    return (Tag(EXIF_ISO, SHORT, (iso,)),) if iso > 0 else ()
+    return merged((Tag(EXIF_ISO, SHORT, (iso,)),) if iso > 0 else (), raw.metadata.exif)
 
 
 def noise_profile(level: NoiseLevel) -> tuple[float, ...]:
@@ -98,7 +115,7 @@ def noise_level(tags: Tags) -> NoiseLevel | None:
 def iso_speed(tags: Tags) -> float:
     """The ISO that `tags` state, exact where FSID wrote it; 0 where they state none."""
     private = _private_numbers(tags)
-    return private[0] if private else _number(tags, EXIF_ISO, 0)
+    return private[0] if private else float(_number(tags, EXIF_ISO, 0))
 
 
 def exposure_time_s(tags: Tags) -> float:
@@ -162,8 +179,3 @@ def _number(tags: Tags, code: int, default: float) -> float:
 def _text(tags: Tags, code: int) -> str:
     values = tags.get(code, b"")
     return values.split(b"\0")[0].decode("ascii", "replace").strip() if isinstance(values, bytes) else ""
-
-
-def _rationals(values: Any) -> tuple[int, ...]:
-    fractions = [Fraction(float(value)).limit_denominator(_DENOMINATOR) for value in values]
-    return tuple(n for f in fractions for n in (f.numerator, f.denominator))

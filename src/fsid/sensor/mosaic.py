@@ -76,7 +76,9 @@ def bayer_crop(raw: Raw, top: int, left: int, height: int, width: int) -> Raw:
     if top < 0 or left < 0 or top + height > rows or left + width > columns:
         raise FsidError(f"crop {width}x{height} at ({left}, {top}) lies outside the {columns}x{rows} image")
     cut = np.ascontiguousarray(raw.mosaic[top : top + height, left : left + width])
-    return replace(raw, mosaic=cut, cfa=shift_cfa(raw.cfa, top, left))
+    return replace(
+        raw, mosaic=cut, cfa=shift_cfa(raw.cfa, top, left), metadata=raw.metadata.without_geometry()
+    )
 
 
 def bayer_flip(raw: Raw, vertical: bool, horizontal: bool) -> Raw:
@@ -87,7 +89,9 @@ def bayer_flip(raw: Raw, vertical: bool, horizontal: bool) -> Raw:
     """
     flipped = raw.mosaic[:: -1 if vertical else 1, :: -1 if horizontal else 1]
     cfa = shift_cfa(raw.cfa, int(vertical), int(horizontal))
-    return replace(raw, mosaic=np.ascontiguousarray(flipped), cfa=cfa)
+    return replace(
+        raw, mosaic=np.ascontiguousarray(flipped), cfa=cfa, metadata=raw.metadata.without_geometry()
+    )
 
 
 def _check_even(shape: tuple[int, ...]) -> None:

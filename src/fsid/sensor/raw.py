@@ -12,6 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fsid.sensor.metadata import Metadata
+
 CFA_PATTERNS = ("RGGB", "BGGR", "GRBG", "GBRG")
 
 
@@ -35,7 +37,7 @@ class Raw:
     white_balance: gains (r, g, b) with g = 1 that make a grey surface grey in camera RGB
     (the inverse of DNG `AsShotNeutral`).
     xyz_to_camera: (3, 3) DNG `ColorMatrix1` for D65, rows R, G, B.
-    iso: 0 where unknown. noise: None where unknown.
+    iso: 0 where unknown. noise: None where unknown. metadata: of the file it was read from.
     """
 
     mosaic: np.ndarray
@@ -47,3 +49,4 @@ class Raw:
     camera: str = "unknown"
     iso: float = 0.0
     noise: NoiseLevel | None = None
+    metadata: Metadata = Metadata()  # noqa: RUF009  frozen

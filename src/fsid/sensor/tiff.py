@@ -10,8 +10,9 @@ because a broken file must cost neither time nor memory: a tag that reaches outs
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import BinaryIO
 
 import numpy as np
@@ -37,6 +38,9 @@ _FORMAT = {
 }
 _HEADER_SIZE = 8
 _MAX_TAG_BYTES = 1 << 20  # a tag of a healthy file that FSID reads is far smaller
+_MAX_DIRECTORY_BYTES = 1 << 23
+_MAX_ENTRIES = 1 << 10
+_DENOMINATOR = 1_000_000
 _MAX_CHILDREN = 16
 
 
@@ -46,7 +50,7 @@ class Tag:
 
     code: int
     kind: int
-    values: Sequence[float] | bytes
+    values: Values
 
 
 @dataclass(frozen=True)
@@ -126,10 +130,16 @@ def _values(tag: Tag) -> tuple[bytes, int]:
     return struct.pack("<" + letters * count, *tag.values), count
 
 
-def read_directories(file: BinaryIO) -> list[dict[int, Values]]:
+def rationals(values: Iterable[float]) -> tuple[int, ...]:
+    """Numerators and denominators in turn; numbers return within 1e-11 of themselves."""
+    fractions = [Fraction(float(value)).limit_denominator(_DENOMINATOR) for value in values]
+    return tuple(n for f in fractions for n in (f.numerator, f.denominator))
+
+
+def read_directories(file: BinaryIO) -> list[dict[int, Tag]]:
     """The first directory of a TIFF, its EXIF directory and its sub-directories, as far as they are whole.
 
-    [] where `file` is no TIFF. Codes map to values; broken entries are left out.
+    [] where `file` is no TIFF. Tags by code; broken entries are left out.
     """
     header = file.read(_HEADER_SIZE)
     order = {b"II*\0": "<", b"MM\0*": ">"}.get(header[:4])
@@ -137,22 +147,23 @@ def read_directories(file: BinaryIO) -> list[dict[int, Values]]:
         return []
     size = file.seek(0, 2)
     first = _read_directory(file, order, struct.unpack(order + "I", header[4:])[0], size)
-    children = (*first.get(EXIF_IFD, ()), *first.get(SUB_IFD, ()))[:_MAX_CHILDREN]
-    return [first, *(_read_directory(file, order, int(offset), size) for offset in children)]
+    children = [offset for code in (EXIF_IFD, SUB_IFD) if code in first for offset in first[code].values]
+    return [first, *(_read_directory(file, order, int(o), size) for o in children[:_MAX_CHILDREN])]
 
 
-def _read_directory(file: BinaryIO, order: str, offset: int, size: int) -> dict[int, Values]:
+def _read_directory(file: BinaryIO, order: str, offset: int, size: int) -> dict[int, Tag]:
     if offset + 2 > size:
         return {}
     file.seek(offset)
     (count,) = struct.unpack(order + "H", file.read(2))
-    entries = file.read(12 * count)
-    tags: dict[int, Values] = {}
+    entries = file.read(12 * min(count, _MAX_ENTRIES))
+    tags: dict[int, Tag] = {}
+    left = _MAX_DIRECTORY_BYTES
     for start in range(0, len(entries) - 11, 12):
         code, kind, values = struct.unpack_from(order + "HHI", entries, start)
         letters = "B" if kind in _BYTES else _FORMAT.get(kind, "")
         length = values * struct.calcsize(order + letters)
-        if not 0 < length <= _MAX_TAG_BYTES:
+        if not 0 < length <= min(_MAX_TAG_BYTES, left):
             continue
         data = entries[start + 8 : start + 8 + length]
         if length > 4:
@@ -161,5 +172,8 @@ def _read_directory(file: BinaryIO, order: str, offset: int, size: int) -> dict[
                 continue
             file.seek(place)
             data = file.read(length)
-        tags[code] = data if kind in _BYTES else struct.unpack(order + letters * values, data)
+            left -= length
+        tags[code] = Tag(
+            code, kind, data if kind in _BYTES else struct.unpack(order + letters * values, data)
+        )
     return tags

@@ -1,0 +1,97 @@
+"""What a RAW file says besides its pixels, kept so that a rewritten file develops like the original.
+
+    read:   tags of the source -> Metadata -> Raw.metadata       write:   Raw.metadata -> tags of the DNG
+
+Kept are the tags that describe camera, colour, lens, exposure and time, value for value. Not kept are those
+that describe pixels as they were stored (compression, levels, linearisation: FSID writes its own), maker
+notes, whose inner offsets break when they move, and where the picture was taken. Files that are no TIFF (CR3,
+RAF) say orientation, exposure and lens through LibRaw instead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from fsid.sensor.tiff import ASCII, RATIONAL, SHORT, Tag, rationals
+
+ORIENTATION, EXPOSURE_TIME, F_NUMBER, FOCAL_LENGTH, LENS_MODEL = 274, 33434, 33437, 37386, 42036
+CROP_ORIGIN, CROP_SIZE = 50719, 50720
+COLOUR_MATRICES = frozenset((50721, 50722, 50723, 50724, 50725, 50726, 50778, 50779, 50964, 50965))
+
+# Make, model, orientation, date, artist, copyright; DNG: camera, colour calibration, lens, profile.
+_FIRST = frozenset((271, 272, ORIENTATION, 306, 315, 33432, 50707, 50708, 50709)) | COLOUR_MATRICES
+_FIRST |= frozenset((50727, 50730, 50731, 50732, 50734, 50735, 50736, 50739, 50931, 50932))
+_FIRST |= frozenset((*range(50936, 50943), 50981, 50982, 51107, 51108, 51109, 51110))
+# Crop, green split, chroma blur, anti-alias, scale; lens corrections that converters apply to linear data.
+_MOSAIC = frozenset((CROP_ORIGIN, CROP_SIZE, 50718, 50733, 50737, 50738, 50780, 51009, 51022, 51125))
+_GEOMETRY = frozenset((CROP_ORIGIN, CROP_SIZE, 51009, 51022, 51125))
+_EXIF = frozenset((EXPOSURE_TIME, F_NUMBER, 34850, 34855, 34864, 34866, 36864, 36867, 36868, 36880, 36881))
+_EXIF |= frozenset((*range(37377, 37387), 37520, 37521, 37522, 41985, 41986, 41987, 41989, 41990))
+_EXIF |= frozenset((42033, 42034, 42035, FOCAL_LENGTH, LENS_MODEL, 42037))
+
+_ORIENTATION_OF_FLIP = {0: 1, 3: 3, 5: 8, 6: 6}  # LibRaw's flip to TIFF's orientation
+
+
+@dataclass(frozen=True)
+class Metadata:
+    """Tags for a DNG's first directory, its mosaic's directory and its EXIF directory."""
+
+    first: tuple[Tag, ...] = ()
+    mosaic: tuple[Tag, ...] = ()
+    exif: tuple[Tag, ...] = ()
+
+    def without_geometry(self) -> Metadata:
+        """The same for an image that was cropped or mirrored: crop and lens corrections are off."""
+        return Metadata(self.first, tuple(t for t in self.mosaic if t.code not in _GEOMETRY), self.exif)
+
+
+def kept_metadata(directories: Sequence[Mapping[int, Tag]], mosaic: Mapping[int, Tag]) -> Metadata:
+    """From the directories of a TIFF-based RAW, the first one first, and the one of its mosaic."""
+    everywhere: dict[int, Tag] = {}
+    for directory in reversed(directories):
+        everywhere |= directory
+    first = directories[0] if directories else {}
+    return Metadata(
+        tuple(tag for code, tag in sorted({**mosaic, **first}.items()) if code in _FIRST),
+        tuple(tag for code, tag in sorted(mosaic.items()) if code in _MOSAIC),
+        tuple(tag for code, tag in sorted(everywhere.items()) if code in _EXIF),
+    )
+
+
+def exposure_metadata(
+    exposure_s: float = 0.0,
+    f_number: float = 0.0,
+    focal_length_mm: float = 0.0,
+    lens: str = "",
+    orientation: int = 1,
+) -> Metadata:
+    """What is known of an exposure; 0 and "" where unknown."""
+    numbers = ((EXPOSURE_TIME, exposure_s), (F_NUMBER, f_number), (FOCAL_LENGTH, focal_length_mm))
+    exif = [Tag(code, RATIONAL, rationals([value])) for code, value in numbers if value > 0]
+    if lens:
+        exif.append(Tag(LENS_MODEL, ASCII, lens.encode("ascii", "replace") + b"\0"))
+    return Metadata((Tag(ORIENTATION, SHORT, (orientation,)),), (), tuple(exif))
+
+
+def libraw_metadata(file: Any) -> Metadata:
+    """What LibRaw says of a file that is no TIFF; a rawpy before 0.25 knows the orientation only."""
+    other, lens = getattr(file, "other", None), getattr(file, "lens", None)
+    return exposure_metadata(
+        exposure_s=float(getattr(other, "shutter", 0.0)),
+        f_number=float(getattr(other, "aperture", 0.0)),
+        focal_length_mm=float(getattr(other, "focal_len", 0.0)),
+        lens=_text(getattr(lens, "lens", "") or getattr(lens, "Lens", "")),
+        orientation=_ORIENTATION_OF_FLIP.get(file.sizes.flip, 1),
+    )
+
+
+def merged(own: Sequence[Tag], kept: Sequence[Tag]) -> tuple[Tag, ...]:
+    """`own` tags, and those of `kept` with other codes."""
+    codes = {tag.code for tag in own}
+    return (*own, *(tag for tag in kept if tag.code not in codes))
+
+
+def _text(value: Any) -> str:
+    return value.decode("ascii", "replace") if isinstance(value, bytes) else str(value)
