@@ -9,11 +9,12 @@ The values are DN; `x = (DN - black_level) / (white_level - black_level)` as eve
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 
 import numpy as np
 import tifffile
-from PIL import Image, UnidentifiedImageError
+from PIL import Image
 
 from fsid.errors import FsidError
 from fsid.sensor.colour import published_matrices
@@ -21,6 +22,10 @@ from fsid.sensor.mosaic import check_cfa, unpack
 from fsid.sensor.quantise import MAX_DN, check_levels, from_dn
 from fsid.sensor.raw import Raw
 
+MAX_PIXELS = 1 << 29
+logging.getLogger("tifffile").setLevel(
+    logging.CRITICAL
+)  # what is wrong with a file is said in one line, here
 BARE_SUFFIXES = (".raw", ".bin", ".npy", ".png", ".tif", ".tiff")
 
 
@@ -84,19 +89,35 @@ def _read(path: Path, cfa: str | None, width: int | None, height: int | None) ->
     kind = path.suffix.lower()
     if kind in (".raw", ".bin"):
         return _read_headerless(path, width, height)
+    if kind not in BARE_SUFFIXES:
+        raise FsidError(f"{path}: unknown kind of mosaic file; use .raw, .bin, .npy, .png or .tif")
     try:
         if kind == ".npy":
             array = np.load(path, allow_pickle=False)
             packed = array.ndim == 3 and array.shape[2] == 4
             return unpack(np.moveaxis(array, 2, 0), cfa) if packed and cfa else array
-        if kind == ".png":
-            with Image.open(path) as image:
-                return np.asarray(image)
-        if kind in (".tif", ".tiff"):
-            return tifffile.imread(path)
-    except (OSError, EOFError, ValueError, UnidentifiedImageError, tifffile.TiffFileError) as error:
-        raise FsidError(f"{path}: cannot read this {kind} file: {error}") from error
-    raise FsidError(f"{path}: unknown kind of mosaic file; use .raw, .bin, .npy, .png or .tif")
+        return _read_png(path) if kind == ".png" else _read_tiff(path)
+    except Exception as error:  # a decoder of a broken file raises anything, zlib.error among it
+        reason = (str(error).splitlines() or [type(error).__name__])[0]
+        raise FsidError(f"{path}: cannot read this {kind} file: {reason}") from error
+
+
+def _read_png(path: Path) -> np.ndarray:
+    with Image.open(path, formats=("PNG",)) as image:
+        _check_size((image.height, image.width))
+        return np.asarray(image)
+
+
+def _read_tiff(path: Path) -> np.ndarray:
+    with tifffile.TiffFile(path) as file:
+        _check_size(file.pages.first.shape)
+        return file.pages.first.asarray()
+
+
+def _check_size(shape: tuple[int, ...]) -> None:
+    """A broken header may promise more pixels than any sensor has; memory is taken before they are read."""
+    if not 0 < np.prod(shape, dtype=float) <= MAX_PIXELS:
+        raise ValueError(f"its header states {'x'.join(map(str, shape))} pixels")
 
 
 def _read_headerless(path: Path, width: int | None, height: int | None) -> np.ndarray:

@@ -121,7 +121,7 @@ def _opened(path: Path) -> Iterator[tuple[rawpy.RawPy, _Source]]:
     try:
         with rawpy.imread(str(path)) as file:
             yield file, source
-    except (rawpy.LibRawError, rawpy.NotSupportedError) as error:
+    except (rawpy.LibRawError, rawpy.NotSupportedError, NotImplementedError) as error:
         reason = error.args[0].decode() if error.args and isinstance(error.args[0], bytes) else error
         raise FsidError(f"{path}: not a RAW file that LibRaw can read ({reason})") from error
 
