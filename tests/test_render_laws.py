@@ -212,6 +212,26 @@ def test_sub_pixel_phase_leaves_smooth_areas_alone(renderer: Renderer) -> None:
     assert noise[CENTRE > 40].max() < 0.05 * 5e-4
 
 
+def test_a_wide_penumbra_of_thin_things_is_smooth(renderer: Renderer) -> None:
+    """No tap pattern: in the shadow of slats under a wide light the phase matters as little as in light.
+
+    Mean over the shadow, scaled to mid-grey. (Measured: 1.3e-5.)
+    """
+    light = point_light((-0.9, 0.0, 1.9), intensity=4.0, radius_m=0.15)
+    places = [Transform((-0.55 + 0.05 * i, 0.0, 0.9), NO_TURN, ONE) for i in range(5)]
+    camera = replace(FROM_ABOVE, fov_deg=20.0, width=320, height=320)
+    slats = [lambertian(block((0.02, 0.5, 0.01)), at=place, object_id=1) for place in places]
+    what = view(lambertian(grid(8.0)), *slats, lights=(light,), camera=camera)
+    frames = [draw(renderer, what, shift_px=(s, s)) for s in (-0.21, 0.0, 0.21)]
+    before, still, after = (frame.radiance[..., 0].astype(float) for frame in frames)
+    unshaded = draw(renderer, replace(what, drawables=what.drawables[:1])).radiance[..., 0]
+    shaded = still / unshaded < 0.95
+    assert (frames[1].object_id == 0).all()
+    assert shaded.mean() > 0.3
+    noise = np.abs((before + after) / 2 - still)[shaded] * 0.18 / still[shaded].mean()
+    assert noise.mean() < 0.05 * 5e-4
+
+
 def test_a_room_closes_every_view(renderer: Renderer) -> None:
     names = ("floor", "ceiling", "wall_north", "wall_south", "wall_east", "wall_west")
     room = Background("room", (3.0, 4.0, 2.5), {name: plain() for name in names})

@@ -1,7 +1,6 @@
 """Scene -> drawables: geometry with a place and materials, the only thing that the passes below know.
 
-The room is one more drawable: a box seen from inside. It receives shadows and casts none, since a convex
-room cannot come between a light and what is inside it.
+The room is one more drawable: a box seen from inside.
 """
 
 from __future__ import annotations
@@ -33,7 +32,6 @@ class Drawable:
     transform: Transform
     materials: tuple[Material, ...]
     object_id: int
-    casts_shadow: bool = True
     specular: float = DIELECTRIC_SPECULAR
 
 
@@ -91,7 +89,7 @@ def room_drawable(background: Background) -> Drawable:
             )
     still = Transform((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
     materials = tuple(background.materials[name] for name in SURFACES)
-    return Drawable(room_mesh(background.size_m), still, materials, BACKGROUND_ID, casts_shadow=False)
+    return Drawable(room_mesh(background.size_m), still, materials, BACKGROUND_ID)
 
 
 def room_mesh(size_m: tuple[float, float, float]) -> Mesh:

@@ -45,7 +45,6 @@ class Geometry:
 
     indices: (3 F,) uint32, drawable after drawable. surfaces: SURFACE (P,). ranges: (N, 2) first index and
     number of indices of each drawable. spheres: (N, 4) world centre and radius of each drawable.
-    casters: (N,) bool, which drawables cast a shadow.
     """
 
     vertices: np.ndarray
@@ -54,7 +53,6 @@ class Geometry:
     surfaces: np.ndarray
     ranges: np.ndarray
     spheres: np.ndarray
-    casters: np.ndarray
 
 
 def merge(drawables: Sequence[Drawable], layer_of: Callable[[Material], Layer]) -> Geometry:
@@ -79,7 +77,6 @@ def merge(drawables: Sequence[Drawable], layer_of: Callable[[Material], Layer]) 
         surfaces=np.stack(surfaces),
         ranges=np.array(ranges, np.uint32),
         spheres=np.array(spheres),
-        casters=np.array([d.casts_shadow for d in drawables]),
     )
 
 

@@ -71,6 +71,7 @@ class Renderer:
         context = self._context
         self._layers = LayerStore(context, texture_size)
         self._depth = load_program(context, "depth.vert", None)
+        self._moments = load_program(context, "screen.vert", "moments.frag")
         self._surface = load_program(context, "surface.vert", "surface.frag")
         self._occlusion = load_program(context, "screen.vert", "occlusion.frag")
         self._blur = load_program(context, "screen.vert", "blur.frag")
@@ -78,7 +79,7 @@ class Renderer:
         self._targets = Targets(context, supersampling)
         self._atlas = ShadowAtlas(context)
         _set(self._occlusion, grid=supersampling, taps=_spiral(32, 1.0))
-        _set(self._lighting, grid=supersampling, search_taps=_spiral(12), filter_taps=_spiral(28))
+        _set(self._lighting, grid=supersampling, search_taps=_spiral(12), filter_taps=_spiral(20))
 
     @property
     def info(self) -> GlInfo:
@@ -151,19 +152,23 @@ class Renderer:
         self._context.finish()
 
     def _draw_shadows(self, geometry: Geometry, plan: ShadowPlan, buffers: _Buffers) -> None:
-        casters = np.flatnonzero(geometry.casters)
         self._context.enable_only(moderngl.DEPTH_TEST)
         self._atlas.begin()
         array = buffers.vertex_array(self._depth)
         _set(self._depth, near=SHADOW_NEAR_M, shift=(0.0, 0.0))
         for tile in plan.tiles:
             tangent = 1.0 / tile.focal
-            seen = casters[in_view(geometry.spheres[casters], tile.origin, tile.axes, (tangent, tangent))]
+            seen = np.flatnonzero(in_view(geometry.spheres, tile.origin, tile.axes, (tangent, tangent)))
             if not len(seen):
                 continue
             self._atlas.framebuffer.viewport = (*tile.corner, plan.tile_px, plan.tile_px)
             _set(self._depth, origin=tile.origin, axes=tile.axes.T, focal=(tile.focal, tile.focal))
             buffers.draw(array, draw_commands(geometry.ranges, seen))
+        self._context.enable_only(moderngl.NOTHING)
+        _set(self._moments, near=SHADOW_NEAR_M)
+        self._atlas.begin_moments()
+        buffers.draw_screen(self._moments)
+        self._atlas.end_moments()
 
     def _draw_surfaces(
         self, geometry: Geometry, lens: Lens, shift: tuple[float, float], buffers: _Buffers
@@ -210,7 +215,7 @@ class Renderer:
             room_half=np.array(room.size_m) / 2,
         )
         self._targets.begin_lighting()
-        self._atlas.use(compare_unit=2, depth_unit=3)
+        self._atlas.use(compare_unit=2, moments_unit=3)
         buffers.room.use(4)
         buffers.draw_screen(self._lighting)
 

@@ -99,7 +99,7 @@ class Targets:
 
 
 class ShadowAtlas:
-    """One depth image that holds the tiles of all lights."""
+    """One depth image that holds the tiles of all lights, and its moments at half the size."""
 
     def __init__(self, context: moderngl.Context) -> None:
         self._context = context
@@ -119,8 +119,12 @@ class ShadowAtlas:
         self._depth.compare_func = ""
         self._depth.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._depth.repeat_x = self._depth.repeat_y = False
+        self._moments = self._context.texture((size[0] // 2, size[1] // 2), 2, dtype="f4")
+        self._moments.build_mipmaps()
+        self._moments.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
         self.framebuffer = self._context.framebuffer([], self._depth)
-        self._owned = [self.framebuffer, self._depth]
+        self._to_moments = self._context.framebuffer([self._moments])
+        self._owned = [self.framebuffer, self._to_moments, self._depth, self._moments]
         self._size = size
 
     def begin(self) -> None:
@@ -129,8 +133,17 @@ class ShadowAtlas:
         self.framebuffer.viewport = (0, 0, *self._size)
         self.framebuffer.clear(depth=1.0)
 
-    def use(self, compare_unit: int, depth_unit: int) -> None:
-        """Bind for filtered comparison and for plain depth."""
+    def begin_moments(self) -> None:
+        """Draw the moments; unit 0 holds the depth."""
+        self._depth.use(0)
+        self._to_moments.use()
+
+    def end_moments(self) -> None:
+        """Average them into mip levels."""
+        self._moments.build_mipmaps()
+
+    def use(self, compare_unit: int, moments_unit: int) -> None:
+        """Bind depth for filtered comparison, and the moments."""
         self._depth.use(compare_unit)
         self._sampler.use(compare_unit)
-        self._depth.use(depth_unit)
+        self._moments.use(moments_unit)

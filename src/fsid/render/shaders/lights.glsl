@@ -9,18 +9,21 @@ struct Light {
 layout(std430, binding = 1) readonly buffer Lights { Light lights[]; };
 uniform int light_count;
 layout(binding = 2) uniform sampler2DShadow shadow_compare;
-layout(binding = 3) uniform sampler2D shadow_depth;
+layout(binding = 3) uniform sampler2D shadow_moments;   // means of 1 / z and 1 / z^2, half the size, with mips
 
 const int SEARCH_TAPS = 12;
-const int FILTER_TAPS = 28;
+const int SHARP_TAPS = 20;
+const int SOFT_TAPS = 20;
 const float BORDER = 0.17;       // of a tile, tangent units: fsid.render.shadows.BORDER
 const float MAX_FILTER = 0.16;
 const float SHADOW_NEAR = 0.02;
 const float BIAS_M = 0.0015;
-uniform vec2 search_taps[SEARCH_TAPS];   // Vogel spirals on the unit disc
-uniform vec2 filter_taps[FILTER_TAPS];
-uniform float tile_px;
+const float SHARP_TEXELS = 3.0, SOFT_TEXELS = 8.0;   // radius of the penumbra: below, above, blended between
+const float LEAK = 0.08;         // share of light that overlapping occluders let through, cut off
 const int TILE_COLUMNS = 6;
+uniform vec2 search_taps[SEARCH_TAPS];   // Vogel spirals on the unit disc
+uniform vec2 filter_taps[SOFT_TAPS];
+uniform float tile_px;
 
 struct Field {
     vec3 q, n;      // position and normal in the tile's axes: right, up, forward
@@ -47,50 +50,88 @@ Field field_of(Light light, vec3 d, vec3 n) {
     return Field(vec3(d.xy, a.z), vec3(n.xy, side * n.z), focal, light.tiles.x + (d.z < 0.0 ? 5 : 4));
 }
 
-// Share of the light's sphere seen from `position`: percentage-closer soft shadows (Fernando 2005) with
-// fixed taps; every tap compares against the depth of the receiver's own plane there.
-float visibility(Light light, vec3 position, vec3 face_normal) {
-    Field field = field_of(light, position - light.position.xyz, face_normal);
+// Where a receiver is in its tile. 1 / z of the receiver's plane is linear in the tangent coordinates.
+struct Receiver {
+    vec2 corner, centre;   // of the tile and of the receiver, 0..1 of the atlas
+    vec2 to_atlas;         // tangent units to 0..1 of the atlas
+    vec2 slope;            // of 1 / z of the plane
+    float inverse_z;
+    float texel;           // of the depth, tangent units
+    float bias;            // of 1 / z
+    float tile_size;       // tangent units
+};
+
+Receiver receiver_of(Field field) {
     vec3 q = field.q, n = field.n;
-    vec2 atlas = vec2(textureSize(shadow_depth, 0));
-    vec2 corner = vec2(field.tile % TILE_COLUMNS, field.tile / TILE_COLUMNS) * tile_px;
-    vec2 centre = q.xy / q.z;
-    float inverse_z = 1.0 / q.z;
-    float texel = 2.0 / (field.focal * tile_px);   // tangent units
-
-    // 1 / z of the plane is linear in the tangent coordinates; steep planes are limited.
+    Receiver r;
+    vec2 atlas = 2.0 * vec2(textureSize(shadow_moments, 0));
+    r.inverse_z = 1.0 / q.z;
+    r.tile_size = 2.0 / field.focal;
+    r.texel = r.tile_size / tile_px;
+    r.to_atlas = tile_px / (atlas * r.tile_size);
+    r.corner = vec2(field.tile % TILE_COLUMNS, field.tile / TILE_COLUMNS) * tile_px / atlas;
+    r.centre = r.corner + r.to_atlas * (0.5 * r.tile_size + q.xy * r.inverse_z);
     float facing = dot(n, q);
-    vec2 slope = n.xy / (abs(facing) > 1e-6 ? facing : 1e-6);
-    float steep = length(slope) * q.z;
-    slope *= min(1.0, 12.0 / max(steep, 1e-6));
-    float bias = (abs(slope.x) + abs(slope.y)) * texel + BIAS_M * inverse_z * inverse_z;
+    r.slope = n.xy / (abs(facing) > 1e-6 ? facing : 1e-6);
+    r.slope *= min(1.0, 12.0 / max(length(r.slope) * q.z, 1e-6));   // steep planes are limited
+    r.bias = BIAS_M * r.inverse_z * r.inverse_z;
+    return r;
+}
 
-    vec2 to_atlas = 0.5 * field.focal * tile_px / atlas;
-    vec2 uv = (corner + 0.5 * tile_px) / atlas + to_atlas * centre;
-    float radius = light.position.w;
-    float search = clamp(2.0 * radius * inverse_z, texel, MAX_FILTER);
-    float found = 0.0, found_inverse_z = 0.0;
-    for (int i = 0; i < SEARCH_TAPS; ++i) {
-        vec2 offset = search * search_taps[i];
-        float limit = inverse_z + dot(slope, offset) + bias;
-        float other = (1.0 - textureLod(shadow_depth, uv + to_atlas * offset, 0.0).r) / SHADOW_NEAR;
-        if (other > limit) {
-            found += 1.0;
-            found_inverse_z += other;
-        }
-    }
-    if (found == 0.0) return 1.0;
-    if (found == float(SEARCH_TAPS)) return 0.0;
+// Light that reaches the receiver's plane at `offset` past what the shadow map holds within `width` of there
+// (both tangent units), by Chebyshev's inequality (Donnelly and Lauritzen 2006); exact for one occluder
+// in front of the plane. blocked: summed 1 / z of the occluders (Yang et al. 2010).
+float soft_tap(Receiver r, vec2 offset, float width, out float blocked) {
+    vec2 inside = r.to_atlas * min(width, 0.5 * r.tile_size);
+    vec2 uv = clamp(r.centre + r.to_atlas * offset, r.corner + inside, r.corner + r.to_atlas * r.tile_size - inside);
+    float level = log2(max(width / (2.0 * r.texel), 1.0));
+    vec2 moments = textureLod(shadow_moments, uv, level).xy;
+    float limit = r.inverse_z + dot(r.slope, (uv - r.centre) / r.to_atlas);
+    float in_front = max(moments.x - limit - r.bias, 0.0);
+    float variance = max(moments.y - moments.x * moments.x, 0.0);
+    float lit = in_front > 0.0 ? variance / (variance + in_front * in_front) : 1.0;
+    blocked = moments.x - lit * limit;
+    return lit;
+}
 
-    float blocker = found_inverse_z / found;
-    float spread = clamp(radius * (blocker - inverse_z), 0.75 * texel, search);
+// Percentage-closer filter on the depth itself, where the penumbra is a few texels.
+float sharp_filter(Receiver r, float radius) {
+    float bias = r.bias + (abs(r.slope.x) + abs(r.slope.y)) * r.texel;
     float lit = 0.0;
-    for (int i = 0; i < FILTER_TAPS; ++i) {
-        vec2 offset = spread * filter_taps[i];
-        float limit = inverse_z + dot(slope, offset) + bias;
-        lit += textureLod(shadow_compare, vec3(uv + to_atlas * offset, 1.0 - SHADOW_NEAR * limit), 0.0);
+    for (int i = 0; i < SHARP_TAPS; ++i) {
+        vec2 offset = radius * filter_taps[i];
+        float limit = r.inverse_z + dot(r.slope, offset) + bias;
+        lit += textureLod(shadow_compare, vec3(r.centre + r.to_atlas * offset, 1.0 - SHADOW_NEAR * limit), 0.0);
     }
-    return lit / float(FILTER_TAPS);
+    return lit / float(SHARP_TAPS);
+}
+
+float soft_filter(Receiver r, float radius) {
+    float lit = 0.0, ignored;
+    for (int i = 0; i < SOFT_TAPS; ++i) lit += soft_tap(r, radius * filter_taps[i], 0.3 * radius, ignored);
+    return clamp((lit / float(SOFT_TAPS) - LEAK) / (1.0 - LEAK), 0.0, 1.0);
+}
+
+// Share of the light's sphere seen from `position`: soft shadows by the mean depth of what is in the way
+// (Fernando 2005), with fixed taps that are areas and not points, so that they leave no pattern.
+float visibility(Light light, vec3 position, vec3 face_normal) {
+    Receiver r = receiver_of(field_of(light, position - light.position.xyz, face_normal));
+    float radius = light.position.w;
+    float search = clamp(2.0 * radius * r.inverse_z, 2.0 * r.texel, MAX_FILTER);
+    float shaded = 0.0, blocked_sum = 0.0;
+    for (int i = 0; i < SEARCH_TAPS; ++i) {
+        float blocked;
+        shaded += 1.0 - soft_tap(r, search * search_taps[i], 0.3 * search, blocked);
+        blocked_sum += blocked;
+    }
+    if (shaded < 1e-4) return 1.0;
+    float blocker = blocked_sum / shaded;
+    float spread = clamp(radius * (blocker - r.inverse_z), 0.75 * r.texel, search);
+    float soft = smoothstep(SHARP_TEXELS, SOFT_TEXELS, spread / r.texel);
+    float lit = 0.0;
+    if (soft < 1.0) lit += (1.0 - soft) * sharp_filter(r, spread);
+    if (soft > 0.0) lit += soft * soft_filter(r, spread);
+    return lit;
 }
 
 // Irradiance at normal incidence, without shadow; to_light is unit.
