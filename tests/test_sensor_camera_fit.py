@@ -180,7 +180,7 @@ def test_bad_bursts_are_named(tmp_path, dng_bursts, rng):
     _fails("states its CFA", [light], layout=LAYOUT)
     _fails("not dark", [light], dark=[dng_bursts / "light1600"])
     moved = write_arrays(tmp_path / "moved", [np.roll(image, 12 * n, 1) for n, image in enumerate(ramp)])
-    _fails("001.npy.*moved", moved, layout=LAYOUT)
+    _fails("001.npy.*(moved|static scene)", moved, layout=LAYOUT)
     _fails("saturated", write_arrays(tmp_path / "white", [np.full((64, 64), 1023)] * 4), layout=LAYOUT)
     sites = np.kron(np.ones((32, 32), np.int64), np.array([[100, 300], [300, 200]]))
     _fails(

@@ -28,6 +28,7 @@ from torch.utils.data import Dataset
 
 from fsid.dataset.index import StoredMosaic, index_mosaics
 from fsid.errors import FsidError
+from fsid.sensor.formula import stored, with_noise
 from fsid.sensor.mosaic import site_offsets
 from fsid.sensor.noise import level_rand
 from fsid.sensor.profiles import CameraProfile, load_profile
@@ -146,16 +147,8 @@ def _expose(
     cameras: list[CameraProfile],
 ) -> np.ndarray:
     """`noisy_from_clean(...)` of the sensor, for a whole batch of levels and cameras at once."""
-    rounding = np.array([[ROUNDING_DN2 / camera.span**2] for camera in cameras], np.float32)
-    noisy = np.maximum(clean, 0)
-    noisy *= k[:, :, None, None]
-    noisy += np.maximum(sigma2 - rounding, 0)[:, :, None, None]
-    np.sqrt(noisy, out=noisy)
-    noisy *= rng.standard_normal(clean.shape, dtype=np.float32)
-    noisy += clean
-    for patch, camera in zip(noisy, cameras, strict=True):
-        patch *= camera.span
-        np.rint(patch, out=patch)
-        np.clip(patch, -camera.black_level, camera.span, out=patch)
-        patch /= camera.span
-    return noisy
+    span = np.array([camera.span for camera in cameras], np.float32)[:, None, None, None]
+    black = np.array([camera.black_level for camera in cameras], np.float32)[:, None, None, None]
+    injected = np.maximum(sigma2[:, :, None, None] - ROUNDING_DN2 / span**2, 0)
+    normal = rng.standard_normal(clean.shape, dtype=np.float32)
+    return stored(with_noise(clean, normal, k[:, :, None, None], injected), black, span)

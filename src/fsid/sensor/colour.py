@@ -10,9 +10,12 @@ from __future__ import annotations
 
 from functools import cache
 from importlib.resources import files
+from typing import Any
 
 import numpy as np
 import yaml
+
+from fsid.sensor.arrays import like
 
 # IEC 61966-2-1, linear sRGB -> XYZ, D65, the rounding that Brooks et al. use.
 SRGB_TO_XYZ = np.array(
@@ -56,6 +59,7 @@ def colour_rand(
     return blend, (float(rng.uniform(*RED_GAIN_RANGE)), 1.0, float(rng.uniform(*BLUE_GAIN_RANGE)))
 
 
-def apply_matrix(matrix: np.ndarray, rgb: np.ndarray) -> np.ndarray:
-    """matrix (3, 3) times every pixel of rgb (..., 3), in float32."""
-    return rgb.astype(np.float32, copy=False) @ matrix.T.astype(np.float32)
+def apply_matrix(matrix: np.ndarray, rgb: Any) -> Any:
+    """matrix (3, 3) times every pixel of rgb (..., 3), an array or a tensor, in float32."""
+    rgb = rgb.astype(np.float32, copy=False) if isinstance(rgb, np.ndarray) else rgb.float()
+    return rgb @ like(matrix.T, rgb)

@@ -4,16 +4,19 @@
 
 Gr is the green that shares its row with red, Gb the one that shares its row with blue; the two sit on
 different readout columns and differ in gain and noise, so they are never averaged. Every other module
-asks here for a site's place in the tile, and none counts pixels itself.
+asks here for a site's place in the tile, and none counts pixels itself. `mosaic`, `pack` and `unpack` take
+arrays and tensors.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from fsid.errors import FsidError
+from fsid.sensor.arrays import namespace
 from fsid.sensor.raw import CFA_PATTERNS, Raw
 
 SITES = ("R", "Gr", "Gb", "B")
@@ -40,26 +43,26 @@ def shift_cfa(cfa: str, rows: int, columns: int) -> str:
     return "".join(cfa[2 * ((r + rows) % 2) + (c + columns) % 2] for r in (0, 1) for c in (0, 1))
 
 
-def mosaic(rgb: np.ndarray, cfa: str) -> np.ndarray:
+def mosaic(rgb: Any, cfa: str) -> Any:
     """Keep of each pixel of `rgb` (H, W, 3), H and W even, the one channel its filter passes: (H, W)."""
     _check_even(rgb.shape[:2])
-    out = np.empty(rgb.shape[:2], rgb.dtype)
+    out = namespace(rgb).empty_like(rgb[..., 0])
     for (r, c), channel in zip(site_offsets(cfa), SITE_CHANNEL, strict=True):
         out[r::2, c::2] = rgb[r::2, c::2, channel]
     return out
 
 
-def pack(mosaic: np.ndarray, cfa: str) -> np.ndarray:
+def pack(mosaic: Any, cfa: str) -> Any:
     """Mosaic (H, W), H and W even, to its four sites (4, H/2, W/2) in the order R, Gr, Gb, B."""
     _check_even(mosaic.shape)
-    return np.stack([mosaic[r::2, c::2] for r, c in site_offsets(cfa)])
+    return namespace(mosaic).stack([mosaic[r::2, c::2] for r, c in site_offsets(cfa)])
 
 
-def unpack(packed: np.ndarray, cfa: str) -> np.ndarray:
+def unpack(packed: Any, cfa: str) -> Any:
     """Inverse of `pack`: (4, H/2, W/2) to (H, W)."""
     if packed.ndim != 3 or packed.shape[0] != 4:
         raise FsidError(f"packed RAW has shape {packed.shape}; expected (4, height/2, width/2)")
-    out = np.empty((2 * packed.shape[1], 2 * packed.shape[2]), packed.dtype)
+    out = namespace(packed).empty_like(packed.reshape(2 * packed.shape[1], 2 * packed.shape[2]))
     for site, (r, c) in zip(packed, site_offsets(cfa), strict=True):
         out[r::2, c::2] = site
     return out

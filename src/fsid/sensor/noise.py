@@ -17,12 +17,15 @@ from dataclasses import replace
 import numpy as np
 
 from fsid.errors import FsidError
+from fsid.sensor.formula import noise_variance, with_noise
+from fsid.sensor.gaussian import standard_normal
 from fsid.sensor.mosaic import site_offsets
 from fsid.sensor.profiles import CameraProfile
 from fsid.sensor.quantise import ROUNDING_DN2
 from fsid.sensor.raw import NoiseLevel, Raw
 
 K_JITTER = 0.05  # relative sigma: conversion gain from unit to unit, and vendors' rounding of ISO
+_BLOCK_PIXELS = 1 << 16
 SIGMA2_JITTER = 0.2  # relative sigma: read noise varies more, with temperature and readout mode
 
 
@@ -31,12 +34,11 @@ def variance(x: np.ndarray, level: NoiseLevel, cfa: str | None = None) -> np.nda
 
     x is packed (4, h, w) in the order R, Gr, Gb, B, or a mosaic (H, W) together with its `cfa`.
     """
-    light = np.maximum(x, 0, dtype=np.float32)
-    sites = list(light) if cfa is None else [light[r::2, c::2] for r, c in site_offsets(cfa)]
-    for site, k, sigma2 in zip(sites, level.k, level.sigma2, strict=True):
-        site *= np.float32(k)
-        site += np.float32(sigma2)
-    return light
+    x = np.asarray(x, np.float32)
+    if cfa is None:
+        return noise_variance(x, *(np.array(v, np.float32)[:, None, None] for v in (level.k, level.sigma2)))
+    tiles = x.reshape(-1, 2, x.shape[1])
+    return noise_variance(tiles, *_rows(level, cfa, x.shape[1])).reshape(x.shape)
 
 
 def add_noise(rng: np.random.Generator, raw: Raw, level: NoiseLevel) -> Raw:
@@ -44,12 +46,15 @@ def add_noise(rng: np.random.Generator, raw: Raw, level: NoiseLevel) -> Raw:
 
     Values may fall below 0 and above 1; `quantise` stores them as the camera would.
     """
-    noise = rng.standard_normal(raw.mosaic.shape, dtype=np.float32)
-    sigma = variance(raw.mosaic, level, raw.cfa)
-    np.sqrt(sigma, out=sigma)
-    noise *= sigma
-    noise += raw.mosaic
-    return replace(raw, mosaic=noise, noise=level)
+    height, width = raw.mosaic.shape
+    rows = _rows(level, raw.cfa, width)
+    noisy = np.empty((height // 2, 2, width), np.float32)
+    tiles = raw.mosaic.reshape(noisy.shape)
+    step = max(1, _BLOCK_PIXELS // (2 * width))  # what a step needs stays in the processor's cache
+    for top in range(0, len(tiles), step):
+        block = tiles[top : top + step]
+        noisy[top : top + step] = with_noise(block, standard_normal(rng, block.shape), *rows)
+    return replace(raw, mosaic=noisy.reshape(height, width), noise=level)
 
 
 def before_converter(level: NoiseLevel, span: float) -> NoiseLevel:
@@ -76,6 +81,15 @@ def level_rand(
     return iso, NoiseLevel(
         k=_scaled(level.k, float(k_factor)), sigma2=_scaled(level.sigma2, float(sigma2_factor))
     )
+
+
+def _rows(level: NoiseLevel, cfa: str, width: int) -> tuple[np.ndarray, np.ndarray]:
+    """k and sigma2 of the two rows of a tile, (2, width) float32 each."""
+    rows = np.empty((2, 2, width), np.float32)
+    for (r, c), k, sigma2 in zip(site_offsets(cfa), level.k, level.sigma2, strict=True):
+        rows[0, r, c::2] = k
+        rows[1, r, c::2] = sigma2
+    return rows[0], rows[1]
 
 
 def _scaled(values: tuple[float, float, float, float], factor: float) -> tuple[float, float, float, float]:

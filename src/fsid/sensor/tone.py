@@ -8,30 +8,54 @@ The smoothstep stands for the contrast curve of an ordinary camera's JPEG engine
 
 from __future__ import annotations
 
+from functools import cache
+from typing import Any
+
 import numpy as np
 
+from fsid.sensor.arrays import lookup, namespace
 
-def srgb_encode(linear: np.ndarray) -> np.ndarray:
+_ENTRIES = 1 << 16  # i / 65535: every value of an 8-bit or 16-bit photo, exactly
+
+
+def srgb_encode(linear: Any) -> Any:
     """Linear 0..1 (clipped to that) to sRGB-encoded 0..1, float32."""
-    v = np.clip(linear, 0, 1, dtype=np.float32)
-    root = np.maximum(v, np.float32(0.0031308)) ** np.float32(1 / 2.4)
-    return np.where(v <= 0.0031308, np.float32(12.92) * v, np.float32(1.055) * root - np.float32(0.055))
+    v = _unit(linear)
+    root = v.clip(min=0.0031308) ** (1 / 2.4)
+    return namespace(v).where(v <= 0.0031308, 12.92 * v, 1.055 * root - 0.055)
 
 
-def srgb_decode(encoded: np.ndarray) -> np.ndarray:
+def srgb_decode(encoded: Any) -> Any:
     """sRGB-encoded 0..1 (clipped to that) to linear 0..1, float32."""
-    v = np.clip(encoded, 0, 1, dtype=np.float32)
-    power = ((v + np.float32(0.055)) / np.float32(1.055)) ** np.float32(2.4)
-    return np.where(v <= 0.04045, v / np.float32(12.92), power)
+    v = _unit(encoded)
+    return namespace(v).where(v <= 0.04045, v / 12.92, ((v + 0.055) / 1.055) ** 2.4)
 
 
-def tone_curve(image: np.ndarray) -> np.ndarray:
+def tone_curve(image: Any) -> Any:
     """Smoothstep of an image in 0..1 (clipped to that), float32."""
-    v = np.clip(image, 0, 1, dtype=np.float32)
+    v = _unit(image)
     return v * v * (3 - 2 * v)
 
 
-def inverse_tone_curve(image: np.ndarray) -> np.ndarray:
+def inverse_tone_curve(image: Any) -> Any:
     """Inverse of `tone_curve` on 0..1, float32."""
-    v = np.clip(image, 0, 1, dtype=np.float32)
-    return np.float32(0.5) - np.sin(np.arcsin(1 - 2 * v) / 3)
+    xp = namespace(image)
+    return 0.5 - xp.sin(xp.arcsin(1 - 2 * _unit(image)) / 3)
+
+
+def photo_to_linear(srgb: Any) -> Any:
+    """`srgb_decode(inverse_tone_curve(srgb))` by table: exact for 8 and 16 bits, nearest entry between."""
+    return lookup(_photo_table(), _unit(srgb))
+
+
+@cache
+def _photo_table() -> np.ndarray:
+    table = srgb_decode(inverse_tone_curve(np.arange(_ENTRIES, dtype=np.float32) / np.float32(_ENTRIES - 1)))
+    table.setflags(write=False)
+    return table
+
+
+def _unit(image: Any) -> Any:
+    if isinstance(image, np.ndarray | np.generic):
+        return np.clip(image, 0, 1, dtype=np.float32)
+    return image.float().clip(0, 1)

@@ -1,0 +1,35 @@
+"""One definition for NumPy arrays and torch tensors: the formulas use what both have.
+
+    v = x.clip(min=0);  v *= k;  v += sigma2            operators and methods of the same name
+    namespace(x).where(...), like(values, x)            functions, and constants where x lives
+
+Nothing here imports torch: a tensor brings it along. What is an array here may be on any device.
+"""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import numpy as np
+
+
+def namespace(x: Any) -> Any:
+    """The module whose functions take `x`: numpy or torch."""
+    return np if isinstance(x, np.ndarray | np.generic) else sys.modules["torch"]
+
+
+def like(values: Any, x: Any) -> Any:
+    """`values` as an array of the type of `x`, on its device."""
+    if isinstance(x, np.ndarray | np.generic):
+        return np.asarray(values, x.dtype)
+    return namespace(x).as_tensor(np.array(values), dtype=x.dtype, device=x.device)
+
+
+def lookup(table: np.ndarray, x: Any) -> Any:
+    """The entry of `table`, float32 of length n, that is nearest to x (n - 1), for x in 0..1."""
+    place = x * (len(table) - 1)
+    place += 0.5
+    if isinstance(x, np.ndarray | np.generic):
+        return table.take(place.astype(np.uint16), mode="clip")
+    return like(table, x)[place.long()]
