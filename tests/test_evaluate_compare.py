@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import shutil
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -130,3 +131,17 @@ def test_a_missing_capture_is_named(small_set: Path, tmp_path: Path):
     (tmp_path / "testset.json").write_text((small_set / "testset.json").read_text())
     with pytest.raises(FsidError, match=r"clean\.dng"):
         compare(tmp_path, [NOISY])
+
+
+def test_a_broken_photograph_leaves_no_test_set(photos: Path, tmp_path: Path):
+    shutil.copytree(photos, tmp_path / "photos")
+    (tmp_path / "photos" / "zzz.png").write_bytes(b"\x89PNG\r\n\x1a\n but not really")
+    with pytest.raises(FsidError, match=r"zzz\.png"):
+        photo_testset([tmp_path / "photos"], tmp_path / "out", camera="pixel6", isos=[800])
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["photos"]
+
+
+def test_an_existing_folder_is_not_overwritten(photos: Path, tmp_path: Path):
+    (tmp_path / "mine.txt").write_text("precious")
+    with pytest.raises(FsidError, match="not empty"):
+        photo_testset([photos], tmp_path, camera="pixel6", isos=[800])

@@ -10,6 +10,8 @@ from tyro.conf import Positional
 from fsid.cli.arguments import Output
 from fsid.cli.progress import progress_bar
 
+DEFAULT_ISOS = (800, 1600, 3200, 6400)
+
 
 def testset(
     source: Positional[Literal["photos"]],
@@ -17,7 +19,7 @@ def testset(
     *,
     output: Output,
     camera: str = "pixel6",
-    iso: tuple[int, ...] = (800, 1600, 3200, 6400),
+    iso: tuple[int, ...] = (),
     lux: tuple[float, ...] = (),
     seed: int = 0,
     quiet: bool = False,
@@ -29,7 +31,7 @@ def testset(
         folders: Folders of photographs; the name of a folder becomes the name of its set.
         output: Folder of the test set.
         camera: Noise profile, a built-in name (fsid profiles) or a file.
-        iso: ISO of each light level.
+        iso: ISO of each light level (800 1600 3200 6400 where neither ISO nor lux is given).
         lux: Light levels in lux: auto-exposure of the camera (exposures up to 1/10 s) makes them ISOs.
         seed: Seed of white balance, colour matrix and noise.
         quiet: No progress bar.
@@ -39,5 +41,6 @@ def testset(
 
     if not folders:
         raise FsidError("fsid testset photos: name at least one folder of photographs")
+    isos = iso if iso or lux else DEFAULT_ISOS
     with progress_bar("photographs", "photographs", quiet=quiet) as progress:
-        photo_testset(folders, output, camera=camera, isos=iso, luxes=lux, seed=seed, progress=progress)
+        photo_testset(folders, output, camera=camera, isos=isos, luxes=lux, seed=seed, progress=progress)

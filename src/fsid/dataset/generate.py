@@ -17,7 +17,7 @@ from fsid.config import from_plain, read_yaml, save_settings, to_plain
 from fsid.dataset.config import GenerateConfig
 from fsid.dataset.photos import find_photos
 from fsid.dataset.sample import encode, make_sample, sample_key
-from fsid.dataset.shards import shard_keys, shard_path, write_shard
+from fsid.dataset.shards import part_path, shard_keys, shard_path, write_shard
 from fsid.errors import FsidError
 from fsid.render import Renderer
 from fsid.sensor import load_profile
@@ -68,16 +68,27 @@ def generate(
     total = sum(len(shard.indices) for shard in todo)
     done = count - total
     progress(done, count)
-    if todo:
-        with get_context("spawn").Pool(
-            min(workers, len(todo)), initializer=_share_cores, initargs=(workers,)
-        ) as pool:
+    for made in _make_shards(todo, workers):
+        done += made
+        progress(done, count)
+    return total
+
+
+def _make_shards(todo: list[_Shard], workers: int) -> Iterator[int]:
+    """Number of samples of each shard as it is finished; half-written ones are removed when stopped."""
+    if not todo:
+        return
+    pool = get_context("spawn").Pool(min(workers, len(todo)), initializer=_share_cores, initargs=(workers,))
+    try:
+        with pool:
             for made in pool.imap_unordered(_make_shard, todo):
                 if isinstance(made, FsidError):
                     raise made
-                done += made
-                progress(done, count)
-    return total
+                yield made
+    finally:
+        pool.join()
+        for shard in todo:
+            part_path(shard.path).unlink(missing_ok=True)
 
 
 def _claim(out: Path, dataset: DatasetConfig) -> None:

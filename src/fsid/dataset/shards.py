@@ -22,6 +22,11 @@ def shard_path(folder: Path, number: int) -> Path:
     return folder / f"shard-{number:05d}.tar"
 
 
+def part_path(path: Path) -> Path:
+    """Where a shard is written before it gets its name."""
+    return path.with_name(f".{path.name}.part")
+
+
 def find_shards(folder: Path) -> list[Path]:
     """The finished shards of a dataset, in order; FsidError where there is none."""
     if not folder.is_dir():
@@ -34,7 +39,7 @@ def find_shards(folder: Path) -> list[Path]:
 
 def write_shard(path: Path, samples: Iterable[tuple[str, Mapping[str, bytes]]]) -> None:
     """Write (key, {extension: bytes}) samples as one tar, atomically. FsidError where the disk refuses."""
-    part = path.with_name(f".{path.name}.part")
+    part = part_path(path)
     with _disk_refusals(path):
         try:
             with tarfile.open(part, "w", format=tarfile.USTAR_FORMAT) as tar:

@@ -10,7 +10,9 @@ A level is a name such as "iso3200"; the noise level of each capture is in its D
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+import shutil
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -99,30 +101,41 @@ def photo_testset(
         raise FsidError("--iso: at least one positive ISO (or --lux) is needed")
     levels = {f"iso{iso}": float(iso) for iso in isos}
     levels |= {f"{lux:g}lux": light_level(profile, lux, highest_iso=np.inf).iso for lux in luxes}
-    if (out / "testset.json").exists():
-        raise FsidError(f"{out}: already holds a test set; use another folder")
     photos = [(folder.name, path) for folder in folders for path in find_photos(folder)]
-    images = []
-    for i, (set_name, path) in enumerate(photos):
-        rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(i,)))
-        image = TestImage(f"{i:04d}-{path.stem}", set_name)
-        clean = clean_from_photo(rng, read_photo(path), profile)
-        try:
-            (out / image.name).mkdir(parents=True, exist_ok=True)
-            write_dng(out / image.name / "clean.dng", clean_levels(clean))
-            for name, iso in levels.items():
-                noisy = noisy_from_clean(rng, clean, iso, profile.level(iso), profile.terms)
-                write_dng(out / image.name / f"{name}.noisy.dng", noisy)
-        except OSError as error:
-            raise FsidError(f"{out}: cannot be written ({error.strerror})") from None
-        images.append(image)
-        progress(i + 1, len(photos))
+    images = tuple(TestImage(f"{i:04d}-{path.stem}", name) for i, (name, path) in enumerate(photos))
     testset = TestSet(
         camera=profile.name,
         levels=tuple(levels),
-        images=tuple(images),
+        images=images,
         seed=seed,
         notes="photographs unprocessed to RAW (Brooks et al. 2019), noise from the camera's profile",
     )
-    (out / "testset.json").write_text(json.dumps(to_plain(testset), indent=1) + "\n", encoding="utf-8")
+    with _staged(out) as root:
+        for i, (image, (_, path)) in enumerate(zip(images, photos, strict=True)):
+            rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(i,)))
+            clean = clean_from_photo(rng, read_photo(path), profile)
+            (root / image.name).mkdir()
+            write_dng(testset.clean(root, image), clean_levels(clean))
+            for level, iso in levels.items():
+                noisy = noisy_from_clean(rng, clean, iso, profile.level(iso), profile.terms)
+                write_dng(testset.noisy(root, image, level), noisy)
+            progress(i + 1, len(photos))
+        (root / "testset.json").write_text(json.dumps(to_plain(testset), indent=1) + "\n", encoding="utf-8")
     return testset
+
+
+@contextmanager
+def _staged(out: Path) -> Iterator[Path]:
+    """A folder beside `out` that becomes `out` when all is written, and vanishes where something fails."""
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise FsidError(f"{out}: exists already and is not empty; use another folder")
+    part = out.with_name(f".{out.name}.part")
+    try:
+        shutil.rmtree(part, ignore_errors=True)
+        part.mkdir(parents=True)
+        yield part
+        part.replace(out)
+    except OSError as error:
+        raise FsidError(f"{out}: cannot be written ({error.strerror})") from None
+    finally:
+        shutil.rmtree(part, ignore_errors=True)

@@ -1,0 +1,5 @@
+"""`python -m fsid`: the command line."""
+
+from fsid.cli.main import main
+
+main()
