@@ -32,7 +32,9 @@ def with_noise(x: Any, normal: Any, k: Any, sigma2: Any) -> Any:
 
 def stored(x: Any, black: Any, span: Any) -> Any:
     """`x` as read back from a file of integers; black and span = white - black in DN; a new array."""
-    v = (x * span).round()
-    v = v.clip(-black, span)
+    v = x * span
+    xp = namespace(v)
+    xp.round(v, out=v)
+    xp.clip(v, -black, span, out=v)
     v /= span
     return v
