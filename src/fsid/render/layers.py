@@ -29,7 +29,7 @@ BUDGET_BYTES = 1600 * 2**20
 """Texture memory: 146 layers of 1024 texels, four times as many of 512; a scene that needs more gets more."""
 
 _RGBA8 = 0x8058
-_FIRST_LAYERS = 16
+_STEP_LAYERS = 16
 _ANISOTROPY = 1.0  # llvmpipe takes 200 times as long for a fragment at 4.0
 
 
@@ -138,24 +138,32 @@ class LayerStore:
             self._resident.popitem(last=False)
             needed -= 1
         if needed > self._capacity:
-            self._grow(min(max(needed, self._capacity * 3 // 2, _FIRST_LAYERS), limit))
+            self._grow(min(-(-needed // _STEP_LAYERS) * _STEP_LAYERS, limit))
 
     def _grow(self, capacity: int) -> None:
-        """New arrays with the resident layers moved to the front, level by level."""
-        old = self._arrays
-        self._arrays = [self._new_array(capacity) for _ in range(2)]
+        """Arrays of `capacity` layers, the resident ones moved to the front; one array after the other, and
+        each old one is free before the next is made, so that growth takes little more than the result."""
+        for i in range(2):
+            target = self._new_array(capacity)
+            if self._capacity:
+                self._move_layers(self._arrays[i], target)
+                self._context.finish()
+                self._arrays[i].release()
+                self._arrays[i] = target
+            else:
+                self._arrays.append(target)
         self._capacity = capacity
-        moved = OrderedDict()
-        for slot, (key, layer) in enumerate(self._resident.items()):
-            for source, target in zip(old, self._arrays, strict=True):
-                for level in range(self._levels):
-                    source.use(0)
-                    self._copy["source_layer"] = layer.index
-                    self._run(self._copy, target, slot, level)
-            moved[key] = Layer(slot, layer.slope_scale, layer.shares)
-        self._resident = moved
-        for array in old:
-            array.release()
+        layers = enumerate(self._resident.items())
+        self._resident = OrderedDict(
+            (key, Layer(slot, layer.slope_scale, layer.shares)) for slot, (key, layer) in layers
+        )
+
+    def _move_layers(self, source: moderngl.TextureArray, target: moderngl.TextureArray) -> None:
+        for slot, layer in enumerate(self._resident.values()):
+            for level in range(self._levels):
+                source.use(0)
+                self._copy["source_layer"] = layer.index
+                self._run(self._copy, target, slot, level)
 
     def _new_array(self, capacity: int) -> moderngl.TextureArray:
         array = self._context.texture_array((self._size, self._size, capacity), 4)
@@ -172,6 +180,7 @@ class LayerStore:
                 buffer.bind_to_storage_buffer(0)
                 self._run(self._upload, array, slot, level)
                 buffer.release()
+        self._context.finish()  # or drivers keep the uploads of a whole scene
         return Layer(slot, texels.slope_scale, texels.shares)
 
     def _run(
