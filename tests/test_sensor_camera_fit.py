@@ -150,6 +150,15 @@ def test_the_command_meets_the_emva_reference(shared_data, tmp_path, name, k, da
     assert (tmp_path / "p.png").stat().st_size > 10_000
 
 
+def test_read_noise_that_reaches_zero_is_said(tmp_path, rng):
+    paths = {
+        kind: write_burst(tmp_path / kind, rng, scene(light), 12800, 10)
+        for kind, light in (("light", 0.9), ("dark", 0.0))
+    }
+    found = calibrate(paths["light"], name="mine", dark=paths["dark"])
+    assert any("reaches DN 0" in note for note in found.notes)
+
+
 def _fails(match, *arguments, **options):
     with pytest.raises(FsidError, match=match) as caught:
         calibrate(*arguments, name="mine", **options)

@@ -27,6 +27,7 @@ from fsid.sensor.terms_fit import DarkFinding, dark_finding, fit_terms, prnu_of
 MIN_FRAMES = 3  # of one ISO; a variance from two is one number per pixel, and a defect looks like noise
 DARK_LEVEL = 0.05  # of the range, above which a dark frame saw light
 DARK_CONTRAST = 0.02  # of the range between blocks, above which a dark frame shows a picture
+CUT_OFF = 0.02  # of the dark pixels left out, above which the rest no longer show all of their noise
 UNCERTAIN = 0.02  # relative standard error of k that deserves a note
 _METHOD = "fsid calibrate: weighted line through pooled temporal variances per CFA site (sensor/calibrate.py)"
 
@@ -79,6 +80,7 @@ class _Reader:
         self.drifts_dn: list[float] = []  # of bursts that drifted
         self.moved: list[Path] = []
         self.saturated: list[Path] = []
+        self.cut_off: list[float] = []  # ISOs whose read noise reaches DN 0
         self.dark: list[DarkFinding] = []
         self.prnu: list[float] = []
         self._done, self._total = 0, len(found.frames) + len(found.dark)
@@ -124,6 +126,8 @@ def _fit_iso(reader: _Reader, iso: float, tie_greens: bool) -> NoiseFit:
         if (finding := dark_finding(stats, iso, burst[0].exposure_s)) is not None:
             reader.dark.append(finding)
             fixed_dn2 = finding.fixed_dn2
+        if stats.clipped_share > CUT_OFF:
+            reader.cut_off.append(iso)
         if number == 0:
             black = black_of(stats, camera.cfa)
         assert black is not None
@@ -181,6 +185,8 @@ def _notes(reader: _Reader, isos: Sequence[float], fits: Sequence[NoiseFit]) -> 
     ):
         if paths:
             yield f"{len(paths)} bursts, the first one that of {paths[0]}: {what}"
+    for iso in sorted(set(reader.cut_off)):
+        yield f"ISO {iso:g}: dark noise reaches DN 0 and is cut off; sigma2 comes out too small"
     for iso, fit in zip(isos, fits, strict=True):
         if (error := float(np.max(fit.k_dn_error / fit.k_dn))) > UNCERTAIN:
             yield f"ISO {iso:g}: k is uncertain by {100 * error:.1f} %; take more frames"

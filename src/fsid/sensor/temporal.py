@@ -7,7 +7,7 @@ the first frame's, which hardly hold noise. They are used only where they exceed
 errors, so that a steady burst is left alone and its variance unbiased. A block that still differs afterwards,
 and by enough to count as noise, has moved: it is left out, and where a quarter moved the burst is refused.
 
-Sums count from the first frame, so that they stay small. Memory is 19 bytes per pixel, however many frames.
+Sums count from the first frame, so that they stay small. Memory is 21 bytes per pixel, however many frames.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ SIGNIFICANT = 5.0  # standard errors: of 64 blocks in 1,000 frames none deviates
 LARGEST_FLICKER = 0.1  # of the light; beyond it this is another exposure, and its noise another noise
 MOVED_SHARE = 0.25  # of the blocks, from which on the burst shows no static scene
 CONTAMINATION = 0.1  # of a pixel's noise variance, from which on a changed block spoils the fit
+ZEROS = 0.02  # of the frames; a normal number falls so often below -2
 LARGEST_CORRELATION = 0.1  # between the changes of neighbours; noise has none
 _BANDING = 0.1  # of the noise that rows or columns may have in common
 _GRID = 8
@@ -70,7 +71,8 @@ class TemporalStatistics:
         assert self._first is not None
         if dn.shape != self._first.shape:
             raise FsidError(f"{name} of the burst is {dn.shape}, the first one {self._first.shape} (H, W)")
-        self._clipped |= (dn <= 0) | (dn >= self._white_level)
+        self._clipped |= dn >= self._white_level
+        self._zeros += dn <= 0
         change = dn - self._first.astype(np.float64)
         if self.frames:
             gain, offset = self._match(change, name)
@@ -96,11 +98,11 @@ class TemporalStatistics:
 
     def sites(self, cfa: str | None) -> list[tuple[np.ndarray, np.ndarray]]:
         """(mean, variance) in DN of the usable pixels of each site; of all pixels if `cfa` is None."""
-        mean = self.mean()
+        mean, usable = self.mean(), ~self._unusable()
         places = [np.s_[:, :]] if cfa is None else [np.s_[r::2, c::2] for r, c in site_offsets(cfa)]
         found = []
         for place in places:
-            keep = ~self._clipped[place]
+            keep = usable[place]
             total, squares = self._sum[place][keep], self._squares[place][keep]
             found.append((mean[place][keep], (squares - total**2 / self.frames) / (self.frames - 1)))
         return found
@@ -108,7 +110,7 @@ class TemporalStatistics:
     @property
     def clipped_share(self) -> float:
         """Share of the pixels that touched 0 or white, or moved, in any frame."""
-        return float(self._clipped.mean())
+        return float(self._unusable().mean())
 
     @property
     def moved_share(self) -> float:
@@ -139,6 +141,13 @@ class TemporalStatistics:
             level_dn2=float(np.var(self.offsets_dn)) if self.frames > 2 else 0.0,
         )
 
+    def _unusable(self) -> np.ndarray:
+        """Pixels that touched white once, moved, or touched 0 in more than `ZEROS` of the frames.
+
+        To leave out every pixel that noise once carried down to 0 would keep the quiet ones and bias sigma2.
+        """
+        return self._clipped | (self._zeros > max(1.0, ZEROS * self.frames))
+
     def _check(self) -> None:
         if self._first is None or self.frames < 2:
             raise FsidError("a burst needs at least two frames: a single one has no variance over time")
@@ -147,6 +156,7 @@ class TemporalStatistics:
         self._first = dn.astype(np.uint16)
         self._sum, self._squares = np.zeros(dn.shape), np.zeros(dn.shape)
         self._clipped = np.zeros(dn.shape, bool)
+        self._zeros = np.zeros(dn.shape, np.uint16)
         self._noise = np.zeros(4)  # sums over frames: d^2, d^4, variance of row means, of column means
         rows, columns = (max(1, min(_GRID, side // _MIN_BLOCK_SIDE_PX)) for side in dn.shape)
         self._block = dn.shape[0] // rows, dn.shape[1] // columns
