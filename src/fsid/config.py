@@ -17,6 +17,7 @@ import cattrs
 import yaml
 
 from fsid.errors import FsidError
+from fsid.files import write_atomically
 
 T = TypeVar("T")
 
@@ -135,9 +136,7 @@ def read_yaml(file: Path) -> dict[str, Any]:
 def save_settings(settings: Any, file: Path) -> None:
     """Write settings as YAML in the order of their definition, replacing the file atomically."""
     text = yaml.safe_dump(to_plain(settings), sort_keys=False, default_flow_style=None, width=110)
-    part = file.with_name(file.name + ".part")
-    part.write_text(text, encoding="utf-8")
-    part.replace(file)
+    write_atomically(file, text.encode())
 
 
 def _yaml_value(override: str, text: str) -> Any:

@@ -8,7 +8,6 @@ that a user hands over is ever unpickled. A readable copy of the card is written
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,6 +21,7 @@ from torch import Tensor
 from fsid.config import from_plain, to_plain
 from fsid.denoise.raw_denoiser import NetworkConfig, RawDenoiser
 from fsid.errors import FsidError
+from fsid.files import write_atomically
 
 MODEL_FILE = "model.safetensors"  # inside a run folder
 _CARD = "fsid_card"
@@ -114,14 +114,3 @@ def read_tensors(path: Path, expected: str) -> tuple[dict[str, Tensor], dict[str
             return {name: file.get_tensor(name) for name in file.keys()}, file.metadata() or {}  # noqa: SIM118
     except (SafetensorError, OSError) as error:
         raise FsidError(f"{path}: is not {expected} ({error})") from None
-
-
-def write_atomically(path: Path, data: bytes) -> None:
-    """Replace `path` by `data`, or leave it as it was. FsidError where the disk refuses."""
-    part = path.with_name(path.name + ".part")
-    try:
-        part.write_bytes(data)
-        os.replace(part, path)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        raise FsidError(f"{path}: cannot be written ({error.strerror})") from None

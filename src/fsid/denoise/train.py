@@ -29,11 +29,12 @@ from fsid.config import load_settings, save_settings, to_plain
 from fsid.dataset.loader import Batch, PatchConfig, PatchDataset
 from fsid.denoise.checkpoint import TrainState, load_checkpoint, save_checkpoint
 from fsid.denoise.live import LiveLine
-from fsid.denoise.model import MODEL_FILE, ModelCard, save_model, write_atomically
+from fsid.denoise.model import MODEL_FILE, ModelCard, save_model
 from fsid.denoise.raw_denoiser import RawDenoiser
 from fsid.denoise.stabilise import stabilise
 from fsid.denoise.train_config import TrainConfig
 from fsid.errors import FsidError
+from fsid.files import write_atomically
 
 CONFIG_FILE = "config.yaml"
 HISTORY_FILE = "history.json"

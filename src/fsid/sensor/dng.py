@@ -8,7 +8,6 @@ a tar shard. The same image gives the same bytes: no clock, no software version.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -19,6 +18,7 @@ import numpy as np
 import rawpy
 
 from fsid.errors import FsidError
+from fsid.files import write_atomically
 from fsid.sensor import dng_tags
 from fsid.sensor.colour import published_matrices
 from fsid.sensor.metadata import Metadata, kept_metadata, libraw_metadata
@@ -56,14 +56,7 @@ def write_dng(target: str | Path | BinaryIO, raw: Raw, preview: np.ndarray | Non
     if not isinstance(target, str | Path):
         target.write(data)
         return
-    path = Path(target)
-    part = path.with_name(path.name + ".part")
-    try:
-        part.write_bytes(data)
-        os.replace(part, path)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        raise FsidError(f"{path}: cannot write this DNG: {error.strerror}") from error
+    write_atomically(Path(target), data)
 
 
 def dng_pixel_offset(dng: str | Path | BinaryIO) -> int:

@@ -23,6 +23,7 @@ import yaml
 from numpy.polynomial.polynomial import polyval
 
 from fsid.errors import FsidError
+from fsid.files import write_atomically
 from fsid.sensor.camera_profile import MONO, CameraProfile, Measurement, Optics
 from fsid.sensor.colour import published_matrices
 from fsid.sensor.iso_law import k_law, sigma2_law
@@ -63,14 +64,8 @@ def save_profile(path: str | Path, profile: CameraProfile) -> None:
     if profile.measured is not None and len(profile.iso) > 1:
         data["law"] = _law(profile)
     data["levels"] = [_level(profile, row) for row in range(len(profile.iso))]
-    path = Path(path)
-    part = path.with_name(path.name + ".part")
-    try:
-        part.write_text(yaml.safe_dump(data, sort_keys=False, default_flow_style=None, width=110))
-        part.replace(path)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        raise FsidError(f"{path}: cannot write this profile: {error.strerror}") from error
+    text = yaml.safe_dump(data, sort_keys=False, default_flow_style=None, width=110)
+    write_atomically(Path(path), text.encode())
 
 
 def _switched_on(terms: NoiseTerms) -> dict[str, Any]:
