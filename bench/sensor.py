@@ -34,13 +34,13 @@ def seconds(work: Callable[[], object]) -> float:
     return min(times)
 
 
-def report(name: str, work: Callable[[], object], array: np.ndarray, pixels: int, reference: float) -> None:
-    """One line; reference: seconds of the direct formula, or nan."""
+def report(
+    name: str, work: Callable[[], object], array: np.ndarray, pixels: int, reference: float | None = None
+) -> None:
+    """One line; reference: seconds of the direct formula, where there is one to compare with."""
     copy, own = seconds(array.copy), seconds(work)
-    print(
-        f"{name:32s} {1e9 * own / pixels:7.2f} ns/px   {own / copy:6.1f} x copy   "
-        f"{reference / own:5.1f} x faster than direct"
-    )
+    line = f"{name:32s} {1e9 * own / pixels:7.2f} ns/px   {own / copy:6.1f} x copy"
+    print(line if reference is None else f"{line}   {reference / own:5.1f} x faster than direct")
 
 
 def main(megapixels: float) -> None:
@@ -51,15 +51,15 @@ def main(megapixels: float) -> None:
     profile = load_profile("pixel6")
     level, matrix, gains = profile.level(3200), profile.xyz_to_camera[0], (2.1, 1.0, 1.7)
     raw = Raw(x, profile.cfa, 64, 1023, gains, matrix)
-    pixels, none = x.size, float("nan")
+    pixels = x.size
     noise = seconds(lambda: transcribed.noise(rng, x, level, raw.cfa))
     report("noise", lambda: add_noise(rng, raw, level), x, pixels, noise)
-    report("noise and quantisation", lambda: noisy_from_clean(rng, raw, 3200, level), x, pixels, none)
-    report("quantisation", lambda: quantise(raw), x, pixels, none)
+    report("noise and quantisation", lambda: noisy_from_clean(rng, raw, 3200, level), x, pixels)
+    report("quantisation", lambda: quantise(raw), x, pixels)
     camera = srgb_to_camera_matrix(matrix)
     direct = seconds(lambda: transcribed.unprocess(photo, camera, gains))
     report("unprocessing", lambda: unprocess(photo, matrix, gains), photo, pixels, direct)
-    report("mosaic", lambda: mosaic(photo, raw.cfa), x, pixels, none)
+    report("mosaic", lambda: mosaic(photo, raw.cfa), x, pixels)
     report("pack", lambda: pack(x, raw.cfa), x, pixels, seconds(lambda: transcribed.pack(x, raw.cfa)))
     for name, electrons in (("0 .. 10", 10.0), ("0 .. 100", 100.0), ("0 .. 5000", 5000.0)):
         lam = x * np.float32(electrons)
