@@ -49,7 +49,9 @@ class Streams(NamedTuple):
     camera: np.random.SeedSequence
 
 
-def sample(config: SceneConfig, seed: int, *, width: int, height: int, variant: str = "full") -> Scene:
+def sample(
+    config: SceneConfig, seed: int, *, width: int = 1920, height: int = 1080, variant: str = "full"
+) -> Scene:
     """The scene of (config, seed, variant) with one camera of width x height pixels.
 
     seed: >= 0. width, height: even, 16 .. 16384. variant: one of VARIANTS. Raises FsidError.
