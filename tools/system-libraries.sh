@@ -2,6 +2,7 @@
 # Headless OpenGL needs libEGL, libGL and a Mesa driver. Installs what is missing (Debian, Ubuntu) when root,
 # else prints the one line to run. A vendor's EGL driver, where present, is preferred at run time.
 set -eu
+PATH="$PATH:/usr/sbin:/sbin" # where ldconfig is, for users too
 
 packages=""
 have() { ldconfig -p 2>/dev/null | grep -q "$1"; }
