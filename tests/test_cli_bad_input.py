@@ -11,6 +11,7 @@ import pytest
 from PIL import Image
 
 from fsid.cli.main import COMMANDS, main
+from fsid.errors import FsidError
 
 
 def refused(capsys: pytest.CaptureFixture[str], *arguments: str | Path) -> str:
@@ -93,6 +94,21 @@ def test_bad_input_is_one_line(
 def test_every_command_is_in_the_list_of_cases():
     covered = {command.split()[0] for command, _ in CASES}
     assert covered == set(COMMANDS) - {"doctor"}, "doctor takes no input"
+
+
+def test_the_doctor_shows_what_it_found_before_it_fails(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+):
+    def no_renderer(**_: object) -> None:
+        raise FsidError("no headless OpenGL here")
+
+    monkeypatch.setattr("fsid.evaluate.doctor.Renderer", no_renderer)
+    with pytest.raises(SystemExit) as stop:
+        main(["doctor"])
+    assert stop.value.code == 2
+    printed = capsys.readouterr()
+    assert "LibRaw" in printed.out
+    assert printed.err.strip() == "fsid: no headless OpenGL here"
 
 
 @pytest.mark.parametrize("command", [*COMMANDS, ""])

@@ -11,6 +11,8 @@ def doctor() -> None:
     from fsid.evaluate.doctor import examine
 
     table = Table(show_header=False, box=None)
-    for name, finding in examine():
-        table.add_row(f"[bold]{name}[/bold]", finding)
-    Console().print(table)
+    try:
+        for name, finding in examine():
+            table.add_row(f"[bold]{name}[/bold]", finding)
+    finally:
+        Console().print(table)
