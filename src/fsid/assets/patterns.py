@@ -131,7 +131,6 @@ def scratches(
     size: int,
     count: int,
     length: float,
-    angle_deg: float = 0.0,
     spread_deg: float = 180.0,
 ) -> np.ndarray:
     """(S, S) float32 in [0, 1]: `count` hair lines a texel wide, `length` of a tile long on average."""

@@ -10,8 +10,7 @@ from fsid.denoise.denoise import denoise_raw
 from fsid.denoise.model import Denoiser
 from fsid.errors import FsidError
 from fsid.sensor import NoiseLevel, Raw, clean_levels, load_profile, read_mosaic, read_raw, write_dng
-
-MOSAIC_SUFFIXES = (".npy", ".raw", ".bin", ".png", ".tif", ".tiff")
+from fsid.sensor.bare import BARE_SUFFIXES
 
 
 @dataclass(frozen=True)
@@ -36,7 +35,7 @@ def read_input(path: Path, layout: MosaicLayout | None) -> Raw:
             width=layout.width,
             height=layout.height,
         )
-    if path.suffix.lower() in MOSAIC_SUFFIXES:
+    if path.suffix.lower() in BARE_SUFFIXES:
         raise FsidError(
             f"{path}: is a bare mosaic, say what it holds: --cfa RGGB --black-level DN --white-level DN"
         )

@@ -30,7 +30,6 @@ BUDGET_BYTES = 1600 * 2**20
 
 _RGBA8 = 0x8058
 _STEP_LAYERS = 16
-_ANISOTROPY = 1.0  # llvmpipe takes 200 times as long for a fragment at 4.0
 
 
 @dataclass(frozen=True)
@@ -82,11 +81,6 @@ def _colour_shares(maps: MaterialMaps) -> np.ndarray:
     ground = 2 * maps.detail * (1 - maps.pattern)
     shares = ((1 - maps.mix) * ground, maps.mix * ground, 2 * maps.detail * maps.pattern)
     return np.array([s.mean(dtype=np.float64) for s in shares])
-
-
-def _difference(height: np.ndarray, axis: int) -> np.ndarray:
-    """Central difference of neighbours on the periodic tile, before division by two texels."""
-    return np.roll(height, -1, axis) - np.roll(height, 1, axis)
 
 
 def _unorm(values: np.ndarray) -> np.ndarray:
