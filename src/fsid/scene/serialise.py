@@ -9,8 +9,8 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import asdict, fields, is_dataclass
-from types import GenericAlias
-from typing import Any, get_args, get_origin, get_type_hints
+from types import GenericAlias, NoneType, UnionType
+from typing import Any, Union, get_args, get_origin, get_type_hints
 
 from fsid.errors import FsidError
 from fsid.scene.model import Scene
@@ -41,6 +41,8 @@ def _read(kind: Any, data: Any, where: str) -> Any:
     if is_dataclass(kind):
         return _read_record(kind, data, where)
     origin, arguments = get_origin(kind), get_args(kind)
+    if origin in (Union, UnionType):
+        return None if data is None else _read(next(a for a in arguments if a is not NoneType), data, where)
     if origin is tuple:
         return _read_tuple(arguments, data, where)
     if origin is dict:
