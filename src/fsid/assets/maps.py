@@ -21,9 +21,9 @@ class MaterialMaps:
     mix, pattern, detail: see the module's equation. roughness: perceptual (alpha = roughness^2).
     height: 0 lowest, 1 highest. metallic: 0 dielectric, 1 metal.
     relief_m: physical height range that `height` spans when the tile is `tile_m` wide; both metres.
-    colours: what colour_a, colour_b, colour_c are in nature, linear; None where any colours will do. A picture is
-    exactly this equation too: with a triangle of three colours around its chromaticities, (mix, pattern) say
-    where in the triangle a texel lies and `detail` how bright it is.
+    colours: what colour_a, colour_b, colour_c are in nature, linear; None where any colours will do. A
+    picture is exactly this equation too: with a triangle of three colours around its chromaticities,
+    (mix, pattern) say where in the triangle a texel lies and `detail` how bright it is.
     """
 
     mix: np.ndarray

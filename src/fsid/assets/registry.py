@@ -18,7 +18,7 @@ import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -129,7 +129,7 @@ def bake_material(family: str, variant: int, size: int = 1024) -> MaterialMaps:
     if not 64 <= size <= 8192 or size & (size - 1):
         raise FsidError(f"material size {size}: must be a power of two from 64 to 8192")
     layers = material.bake(_rng(family, variant), variant, size)
-    maps = {name: _finished(field, size) for name, field in layers._asdict().items()}
+    maps: dict[str, Any] = {name: _finished(field, size) for name, field in layers._asdict().items()}
     return MaterialMaps(**maps, relief_m=material.relief_m, tile_m=material.tile_m)
 
 

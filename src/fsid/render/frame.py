@@ -15,9 +15,9 @@ class Frame:
     albedo: (H, W, 3) linear, 0..1. normal: (H, W, 3) unit, camera space (x right, y up, z to the viewer).
     depth: (H, W) metres along the viewing axis, inf where nothing was hit.
     object_id: (H, W) int32, index into `scene.objects`; -1 is the background.
-    flow: (H, W, 2) pixels right and down from where a surface point is seen here to where the other camera that
-    was asked for sees it (also where it is hidden there); NaN where nothing was hit. None where no other camera
-    was named.
+    flow: (H, W, 2) pixels right and down from where a surface point is seen here to where the other camera
+    that was asked for sees it (also where it is hidden there); NaN where nothing was hit. None where no other
+    camera was named.
     The labels (all but radiance) are those of the middle of the exposure and of the sharp image.
     """
 

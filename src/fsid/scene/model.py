@@ -98,12 +98,12 @@ class Background:
 class Light:
     """One light. E is the irradiance of a surface that faces it at distance r, without shadow.
 
-    kind "point" or "spot": `colour` is radiant intensity (linear RGB, radiance units x m^2), E = colour / r^2.
+    kind "point" or "spot": `colour` is radiant intensity (linear RGB, radiance x m^2), E = colour / r^2.
     kind "sun": parallel light along `direction`; `colour` is E itself, radius_m the tangent of its angular
         radius (0.0047 for the sun); position_m is ignored.
-    kind "area": a rectangle size_m (width along `direction` x world z or world x where that vanishes, height
-        across) around position_m that emits the radiance `colour` to the side of `direction`, Lambertian; it is
-        seen by the camera and mirrored, too.
+    kind "area": a rectangle size_m (width along `direction` x world z, or world x where that vanishes;
+        height across) around position_m that emits the radiance `colour` to the side of `direction`,
+        Lambertian; it is seen by the camera and mirrored, too.
     radius_m: of the emitting sphere of a point or spot (softness of the shadow). cone_deg: full outer angle,
     spot only.
     """
@@ -121,8 +121,8 @@ class Light:
 class Sky:
     """Radiance from outside by direction: seen, mirrored, and arriving as ambient light through no wall.
 
-    source: "procedural" (horizon to zenith gradient, clouds of `cloudiness` drawn from `seed`, ground glow) or
-    "file:PATH" of an equirectangular .hdr or .exr picture. colour: mean radiance of the upper half.
+    source: "procedural" (horizon to zenith gradient, clouds of `cloudiness` drawn from `seed`, ground glow)
+    or "file:PATH" of an equirectangular .hdr or .exr picture. colour: mean radiance of the upper half.
     azimuth_deg: rotation about z. The sun itself is a `Light` of kind "sun".
     """
 
