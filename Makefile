@@ -5,19 +5,20 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+TEST_READY := $(VENV)/.test-ready
 
 .PHONY: demo test bench setup clean
 
 demo: setup
 	$(BIN)/fsid demo -o fsid-demo
 
-test: setup
+test: $(TEST_READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/pytest
 
-bench: setup
+bench: $(TEST_READY)
 	for script in bench/*.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done
 
 setup: $(READY)
@@ -26,8 +27,12 @@ $(READY): pyproject.toml constraints.txt tools/system-libraries.sh
 	tools/system-libraries.sh
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "FSID needs Python 3.11 or newer: make PYTHON=python3.11 ...")'
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[train,test]'
+	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[train]'
 	touch $(READY)
+
+$(TEST_READY): $(READY)
+	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[all,test]'
+	touch $(TEST_READY)
 
 clean:
 	rm -rf $(VENV) build dist fsid-demo test-output .pytest_cache .mypy_cache .ruff_cache

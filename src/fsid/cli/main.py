@@ -42,7 +42,16 @@ COMMANDS: dict[str, Callable[..., None]] = {
 }
 
 DESCRIPTION = "RAW denoisers trained on nothing but rendered scenes: generate pairs, train, denoise, prove."
-EXTRAS = {"torch": "train", "accelerate": "train", "safetensors": "train"}
+EXTRAS = {
+    "torch": "train",
+    "accelerate": "train",
+    "safetensors": "train",
+    "onnx": "onnx",
+    "onnxruntime": "onnx",
+    "onnxscript": "onnx",
+    "ray": "ray",
+    "mitsuba": "reference",
+}
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
