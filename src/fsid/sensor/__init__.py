@@ -1,6 +1,7 @@
 """The camera: clean light to the RAW file that a named camera would have stored, and back to a picture."""
 
 from fsid.sensor.bare import read_mosaic
+from fsid.sensor.blind import NoiseEstimate, estimate_noise
 from fsid.sensor.calibrate import NoiseFit, fit_noise
 from fsid.sensor.camera_fit import Calibration, calibrate
 from fsid.sensor.camera_profile import CameraProfile
@@ -28,6 +29,7 @@ __all__ = [
     "CameraProfile",
     "Layout",
     "LightLevel",
+    "NoiseEstimate",
     "NoiseFit",
     "NoiseLevel",
     "NoiseTerms",
@@ -49,6 +51,7 @@ __all__ = [
     "develop_linear",
     "dimmed",
     "dng_pixel_offset",
+    "estimate_noise",
     "expose",
     "exposure_rand",
     "fit_noise",

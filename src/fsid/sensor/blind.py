@@ -1,0 +1,196 @@
+"""The noise of one RAW image, from nothing but the image: Var(x) = k x + sigma2 per CFA site.
+
+    block (8x8 of one site) -> orthonormal DCT:   mean = DC,   texture? = low AC energy,   V = high AC energy
+    V(mean) of the blocks without texture -> line
+
+The coefficients of white noise are independent of each other, so choosing blocks by their low frequencies
+leaves the noise in their high ones as it was (Ponomarenko et al. 2007; Colom, Buades & Morel 2014 for RAW). A
+block is smooth where its low frequencies hold no more energy than its noise alone would half of the time; the
+noise is known better after each round. Blocks of like mean are pooled by their median, and pools above the
+line count less than those below it: texture that was missed only ever adds.
+
+A picture rarely shows every colour in every light, so a site that says little is drawn to the mean of all
+four, from which the sites of published phones differ by `SITE_SPREAD`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.fft import dctn
+from scipy.optimize import nnls
+from scipy.stats import chi2
+
+from fsid.errors import FsidError
+from fsid.sensor.mosaic import site_offsets
+from fsid.sensor.quantise import ROUNDING_DN2
+from fsid.sensor.raw import NoiseLevel, Raw
+
+SITE_SPREAD = (0.1, 0.3)  # relative, of k and sigma2: twelve published phones
+LINEAR_SHARE = 0.9  # of the range; brighter blocks are near saturation
+_SIDE = 8
+_MAX_BLOCKS = 40_000  # of one site
+_POOLS = 24
+_MIN_POOL = 20  # blocks
+_MIN_BLOCKS = 64  # of all sites
+_MIN_SMOOTH = 400  # blocks; a picture with fewer lets in rougher ones, up to `_ROUGHEST`
+_ROUGHEST = 4.0  # energy of low frequencies over that of noise
+_FIRST_SHARE = 0.05  # of the blocks, the smoothest ones, from which the first line comes
+_ROUNDS = 8
+_SMOOTH_QUANTILE = 0.5
+_REWEIGHTINGS = 12
+
+
+@dataclass(frozen=True)
+class NoiseEstimate:
+    """What one image says of its noise, normalised; errors: one standard error per site R, Gr, Gb, B."""
+
+    level: NoiseLevel
+    k_error: tuple[float, float, float, float]
+    sigma2_error: tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class _Blocks:
+    """Blocks of one site: mean, energy of low frequencies and of high ones, each per coefficient.
+
+    share: of a block that no other block holds too; blocks overlap where there are few.
+    """
+
+    mean: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    share: float
+
+
+@dataclass(frozen=True)
+class _Pools:
+    """Medians of smooth blocks: mean, variance, and how many independent coefficients stand behind each."""
+
+    mean: np.ndarray
+    variance: np.ndarray
+    freedom: np.ndarray
+
+
+def _frequencies() -> tuple[np.ndarray, np.ndarray]:
+    order = np.add.outer(np.arange(_SIDE), np.arange(_SIDE))
+    return (order > 0) & (order < _SIDE - 1), order >= _SIDE
+
+
+_LOW, _HIGH = _frequencies()
+_LOW_LIMIT = chi2.ppf(_SMOOTH_QUANTILE, _LOW.sum()) / _LOW.sum()
+_HIGH_MEDIAN = chi2.median(_HIGH.sum()) / _HIGH.sum()
+_MEDIAN_EFFICIENCY = 2 / np.pi  # of the median against the mean
+
+
+def estimate_noise(raw: Raw) -> NoiseEstimate:
+    """k and sigma2 of `raw`, one noisy image of at least 64x64 pixels, with their standard errors.
+
+    sigma2 is never below the rounding noise of the camera's integers. Fixed pattern noise counts as noise.
+    FsidError: an image without smooth parts, saturated or without noise: nothing to measure.
+    """
+    blocks = [_blocks(raw.mosaic[r::2, c::2]) for r, c in site_offsets(raw.cfa)]
+    floor = ROUNDING_DN2 / (raw.white_level - raw.black_level) ** 2
+    mean, low, high = (np.concatenate([getattr(b, n) for b in blocks]) for n in ("mean", "low", "high"))
+    together = _Blocks(mean, low, high, blocks[0].share)
+    if together.mean.size < _MIN_BLOCKS:
+        raise FsidError("the image is too small, or saturated almost everywhere, to tell its noise")
+    line = _first_line(together, floor)
+    for _ in range(_ROUNDS):
+        line, errors = _line(_pools(together, line), floor)
+    sites = [_site_line(_pools(site, line), line, errors, floor) for site in blocks]
+    (k, sigma2), (k_error, sigma2_error) = np.transpose(sites, (1, 2, 0))
+    return NoiseEstimate(NoiseLevel(_four(k), _four(sigma2)), _four(k_error), _four(sigma2_error))
+
+
+def _blocks(plane: np.ndarray) -> _Blocks:
+    """Blocks of `plane` (h, w) in an even grid, overlapping where there are few; without saturated ones."""
+    height, width = plane.shape
+    step = _SIDE
+    while step > 2 and (height // step) * (width // step) < _MAX_BLOCKS:
+        step //= 2
+    share = (step / _SIDE) ** 2
+    if min(height, width) < _SIDE:
+        none = np.empty(0, np.float32)
+        return _Blocks(none, none, none, share)
+    tiles = np.lib.stride_tricks.sliding_window_view(plane, (_SIDE, _SIDE))[::step, ::step]
+    tiles = tiles.reshape(-1, _SIDE, _SIDE)
+    tiles = tiles[:: max(1, len(tiles) // _MAX_BLOCKS)]
+    tiles = tiles[tiles.max(axis=(1, 2)) < LINEAR_SHARE]
+    energy = dctn(tiles, axes=(1, 2), norm="ortho") ** 2
+    return _Blocks(
+        tiles.mean(axis=(1, 2)), energy[:, _LOW].mean(axis=1), energy[:, _HIGH].mean(axis=1), share
+    )
+
+
+def _first_line(blocks: _Blocks, floor: float) -> np.ndarray:
+    """(k, sigma2) from the smoothest blocks of each part of the range."""
+    order = np.argsort(blocks.mean)
+    parts = [part for part in np.array_split(order, _POOLS) if part.size]
+    chosen = np.concatenate(
+        [part[np.argsort(blocks.low[part])[: max(3, int(_FIRST_SHARE * part.size))]] for part in parts]
+    )
+    mean, variance = blocks.mean[chosen].clip(min=0), blocks.high[chosen]
+    scale = 1 / np.maximum(variance, np.median(variance) / 4)
+    design = np.stack([mean, np.ones_like(mean)], axis=1)
+    line, _ = nnls(design * scale[:, None], variance * scale)
+    return np.maximum(line, (0, floor))
+
+
+def _pools(blocks: _Blocks, line: np.ndarray) -> _Pools:
+    expected = line[0] * blocks.mean.clip(min=0) + line[1]
+    roughness = blocks.low / expected
+    enough = np.partition(roughness, _MIN_SMOOTH)[_MIN_SMOOTH] if roughness.size > _MIN_SMOOTH else np.inf
+    smooth = np.flatnonzero(roughness <= max(_LOW_LIMIT, min(enough, _ROUGHEST)))
+    order = smooth[np.argsort(blocks.mean[smooth])]
+    parts = np.array_split(order, max(1, min(_POOLS, order.size // _MIN_POOL)))
+    parts = [part for part in parts if part.size >= _MIN_POOL]
+    mean = np.array([blocks.mean[part].mean() for part in parts])
+    variance = np.array(
+        [np.median(blocks.high[part] / expected[part]) * expected[part].mean() for part in parts]
+    )
+    freedom = np.array([part.size * blocks.share * _HIGH.sum() * _MEDIAN_EFFICIENCY for part in parts])
+    return _Pools(mean, variance / _HIGH_MEDIAN, freedom)
+
+
+def _line(pools: _Pools, floor: float) -> tuple[np.ndarray, np.ndarray]:
+    """(k, sigma2) and their standard errors; pools above the line, which texture lifts, count less."""
+    if pools.mean.size < 2:
+        raise FsidError("the image has no smooth part in which its noise could be seen")
+    design = np.stack([pools.mean.clip(min=0), np.ones_like(pools.mean)], axis=1)
+    model = pools.variance
+    weight = np.ones_like(model)
+    for _ in range(_REWEIGHTINGS):
+        root = np.sqrt(weight * pools.freedom / 2) / model
+        line, _ = nnls(design * root[:, None], (pools.variance - floor) * root)
+        line[1] += floor
+        model = design @ line
+        z = (pools.variance / model - 1) / np.sqrt(2 / pools.freedom)
+        weight = 1 / (1 + (z.clip(min=0) / 2) ** 2)
+    root = np.sqrt(weight * pools.freedom / 2) / model
+    scatter = max(1.0, float(np.sum((root * (pools.variance - model)) ** 2) / max(len(model) - 2, 1)))
+    normal = (design * root[:, None]).T @ (design * root[:, None])
+    return line, np.sqrt(np.diag(np.linalg.pinv(normal)) * scatter)
+
+
+def _site_line(
+    pools: _Pools, line: np.ndarray, errors: np.ndarray, floor: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """(k, sigma2) of one site and their errors, its own pools weighed against the line of all sites."""
+    prior = np.hypot(errors, np.array(SITE_SPREAD) * line)
+    if pools.mean.size == 0:
+        return line, prior
+    design = np.stack([pools.mean.clip(min=0), np.ones_like(pools.mean)], axis=1)
+    model = design @ line
+    z = (pools.variance / model - 1) / np.sqrt(2 / pools.freedom)
+    root = np.sqrt(pools.freedom / 2 / (1 + (z.clip(min=0) / 2) ** 2)) / model
+    rows = np.concatenate([design * root[:, None], np.diag(1 / prior)])
+    values = np.concatenate([pools.variance * root, line / prior])
+    found, *_ = np.linalg.lstsq(rows, values, rcond=None)
+    return np.maximum(found, (0, floor)), np.sqrt(np.diag(np.linalg.inv(rows.T @ rows)))
+
+
+def _four(values: np.ndarray) -> tuple[float, float, float, float]:
+    a, b, c, d = (float(v) for v in values)
+    return a, b, c, d
