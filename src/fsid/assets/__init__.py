@@ -1,5 +1,6 @@
 """Everything a scene is made of: name and seed -> mesh, name and variant -> material maps."""
 
+from fsid.assets.kinds import PART_KINDS, part_kind
 from fsid.assets.maps import MaterialMaps
 from fsid.assets.mesh import Mesh
 from fsid.assets.registry import (
@@ -13,6 +14,7 @@ from fsid.assets.registry import (
 
 __all__ = [
     "MATERIAL_VARIANTS",
+    "PART_KINDS",
     "MaterialMaps",
     "Mesh",
     "bake_material",
@@ -20,4 +22,5 @@ __all__ = [
     "material_families",
     "material_tile_m",
     "mesh_families",
+    "part_kind",
 ]

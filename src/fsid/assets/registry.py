@@ -6,6 +6,9 @@ A family is one small function that registers itself by decorator; the modules o
     @mesh_family("stool")                      @material_family("brick", tile_m=1.0, relief_m=0.012)
     def stool(rng): return {"seat": [...]}     def brick(rng, variant, size): return Layers(...)
 
+A part name tells with a word of `fsid.assets.PART_KINDS` what it is made of where only one matter makes
+sense ("leaf", "glass", "cloth_seat"); the docstring's first line is the family's line in docs/objects.md.
+
 Everything is a function of (name, seed) or (name, variant) alone: the same scene gives the same geometry
 and the same texels in every process and on every machine.
 """
