@@ -16,7 +16,14 @@ from fsid.cli.main import COMMANDS, main
 from fsid.sensor import Raw, load_profile, noisy_from_clean, read_raw, to_dn
 
 REPOSITORY = Path(__file__).resolve().parents[1]
-GUIDES = ("noise-profiles.md", "generate.md", "calibrate.md", "train-and-denoise.md", "evaluate.md")
+GUIDES = (
+    "noise-profiles.md",
+    "generate.md",
+    "calibrate.md",
+    "train-and-denoise.md",
+    "evaluate.md",
+    "inspect.md",
+)
 
 
 def commands(guide: str) -> list[str]:

@@ -1,0 +1,133 @@
+"""Pictures in, statistics out: a dataset of this package, or any folder of photographs, seen alike.
+
+    dataset: clean mosaic -> R, (Gr + Gb) / 2, B at half resolution -> white balance, CCM -> sRGB curve
+    photo:   inverse tone curve -> every second row and column of each channel -> sRGB curve
+
+Both are the light on the sensor, without interpolation. See `statistics` for what is measured.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from fsid.dataset.index import StoredMosaic, index_mosaics
+from fsid.dataset.photos import find_photos, read_photo
+from fsid.dataset.shards import read_member
+from fsid.dataset.statistics import Comparison, compare, measure, pool
+from fsid.errors import FsidError
+from fsid.files import write_atomically
+from fsid.sensor import camera_to_srgb_matrix, pack, srgb_encode
+from fsid.sensor.tone import photo_to_linear
+
+MAX_PICTURES = 400
+"""Of a larger set, this many pictures are measured, evenly spaced."""
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """The statistics of a set, of its reference, and their distances. `reference` is None without one."""
+
+    data: str
+    pictures: int
+    values: dict[str, np.ndarray]
+    reference: dict[str, np.ndarray] | None = None
+    reference_name: str = ""
+    comparisons: tuple[Comparison, ...] = ()
+
+
+def inspect(
+    data: Path,
+    reference: Path | None = None,
+    other: Path | None = None,
+    *,
+    limit: int = MAX_PICTURES,
+    progress: Progress = lambda done, total: None,
+) -> Inspection:
+    """Measure `data`, and compare it with `reference`, both a dataset or a folder of photographs.
+
+    other: a second real set, whose distance to the reference is the yardstick; without it the two halves of
+    the reference (every second picture) take its place. Raises FsidError.
+    """
+    if limit < 1:
+        raise FsidError(f"--limit {limit}: measure at least one picture")
+    readers = [_reader(folder, limit) for folder in (data, reference, other) if folder is not None]
+    total = sum(len(items) for items, _ in readers)
+    measured: list[list[dict[str, np.ndarray]]] = []
+    done = 0
+    for items, read in readers:
+        measured.append([])
+        for item in items:
+            measured[-1].append(measure(read(item)))
+            done += 1
+            progress(done, total)
+    values = pool(measured[0])
+    if reference is None:
+        return Inspection(str(data), len(measured[0]), values)
+    real = pool(measured[1])
+    if other is not None:
+        comparisons = compare(values, real, pool(measured[2]))
+    elif len(measured[1]) > 1:
+        halves = compare(pool(measured[1][::2]), pool(measured[1][1::2]))
+        found = compare(values, real)
+        comparisons = [
+            Comparison(f.name, f.mean, f.reference_mean, f.distance, half.distance)
+            for f, half in zip(found, halves, strict=True)
+        ]
+    else:
+        comparisons = compare(values, real)
+    return Inspection(str(data), len(measured[0]), values, real, str(reference), tuple(comparisons))
+
+
+def save_inspection(inspection: Inspection, path: Path) -> None:
+    """Write means, distances and yardsticks as JSON."""
+    content = {
+        "data": inspection.data,
+        "pictures": inspection.pictures,
+        "mean": {name: float(values.mean()) for name, values in inspection.values.items()},
+        "reference": inspection.reference_name,
+        "statistics": [_finite(asdict(c)) for c in inspection.comparisons],
+    }
+    write_atomically(path, (json.dumps(content, indent=1) + "\n").encode())
+
+
+def _finite(record: dict) -> dict:
+    return {key: None if value != value else value for key, value in record.items()}
+
+
+def _reader(folder: Path, limit: int) -> tuple[Sequence, Callable[..., np.ndarray]]:
+    """What is to be read of a folder, and the function that reads one of it."""
+    if not folder.is_dir():
+        raise FsidError(f"{folder}: is neither a dataset nor a folder of photographs")
+    if any(folder.glob("shard-*.tar")):
+        return _spaced(index_mosaics(folder), limit), _stored_picture
+    return _spaced(find_photos(folder), limit), _photo_picture
+
+
+def _spaced(items: Sequence, limit: int) -> list:
+    at = np.linspace(0, len(items) - 1, min(limit, len(items))).round().astype(int)
+    return [items[i] for i in at]
+
+
+def _stored_picture(stored: StoredMosaic) -> np.ndarray:
+    record = json.loads(read_member(stored.shard, f"{stored.key}.json"))
+    levels = np.memmap(
+        stored.shard, "<u2", mode="r", offset=stored.offset, shape=(stored.height, stored.width)
+    )
+    mosaic = (levels.astype(np.float32) - stored.black_level) / (stored.white_level - stored.black_level)
+    red, green_r, green_b, blue = pack(mosaic, stored.cfa)
+    gains = np.array(record["white_balance"], np.float32) / min(record["white_balance"])
+    balanced = np.minimum(np.stack([red, (green_r + green_b) / 2, blue], axis=-1) * gains, 1)
+    return srgb_encode(balanced @ camera_to_srgb_matrix(np.array(record["xyz_to_camera"])).T)
+
+
+def _photo_picture(path: Path) -> np.ndarray:
+    linear = photo_to_linear(read_photo(path))
+    red, green, blue = linear[::2, ::2, 0], linear[..., 1], linear[1::2, 1::2, 2]
+    return srgb_encode(np.stack([red, (green[::2, 1::2] + green[1::2, ::2]) / 2, blue], axis=-1))

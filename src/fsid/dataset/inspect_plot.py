@@ -1,0 +1,41 @@
+"""The figure of `fsid inspect`: the distribution of every statistic, the set beside its reference."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from fsid.dataset.inspect import Inspection
+from fsid.dataset.statistics import TITLES
+from fsid.files import write_atomically
+
+_COLUMNS = 4
+_BINS = 40
+
+
+def plot_inspection(path: Path, inspection: Inspection) -> None:
+    """Write the histograms as PNG."""
+    distances = {c.name: c for c in inspection.comparisons}
+    rows = -(-len(TITLES) // _COLUMNS)
+    figure = Figure(figsize=(4.2 * _COLUMNS, 2.8 * rows), layout="constrained")
+    for axes, (name, title) in zip(figure.subplots(rows, _COLUMNS).flat, TITLES.items(), strict=False):
+        sets = {Path(inspection.data).name: inspection.values[name]}
+        if inspection.reference is not None:
+            sets[f"{Path(inspection.reference_name).name} (reference)"] = inspection.reference[name]
+        both = np.concatenate(list(sets.values()))
+        low, high = (float(q) for q in np.quantile(both, (0.002, 0.998)))
+        edges = np.linspace(low, high if high > low else low + 1.0, _BINS + 1)
+        for label, values in sets.items():
+            weights = np.full(len(values), 100 / len(values))
+            axes.hist(values, edges, weights=weights, label=label, alpha=0.55)
+        distance = f"\ndistance {distances[name].distance:.2f}" if name in distances else ""
+        axes.set_title(title + distance, fontsize=9)
+        axes.set_ylabel("%", fontsize=8)
+        axes.tick_params(labelsize=7)
+    figure.axes[0].legend(fontsize=7)
+    data = io.BytesIO()
+    figure.savefig(data, format="png", dpi=90)
+    write_atomically(path, data.getvalue())

@@ -1,0 +1,123 @@
+"""Statistics of pictures: known answers, distances that behave like distances, and the command."""
+
+import json
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from fsid.cli.main import main
+from fsid.dataset.statistics import TITLES, compare, distance, measure, pool, spectrum_slope
+
+
+def _noise(slope: float, size: int = 256, seed: int = 0) -> np.ndarray:
+    """(size, size) Gaussian field whose power falls as frequency^slope, mean 0.5, std 0.1."""
+    rng = np.random.default_rng(seed)
+    frequency = np.hypot(np.fft.fftfreq(size)[:, None], np.fft.rfftfreq(size))
+    frequency[0, 0] = 1
+    field = np.fft.irfft2(np.fft.rfft2(rng.normal(size=(size, size))) * frequency ** (slope / 2))
+    return (0.5 + 0.1 * (field - field.mean()) / field.std()).astype(np.float32)
+
+
+def _grey(luma: np.ndarray) -> np.ndarray:
+    return np.repeat(luma[..., None], 3, axis=-1)
+
+
+@pytest.mark.parametrize("slope", [-1.0, -2.0, -3.0])
+def test_slope_of_a_known_spectrum(slope):
+    assert spectrum_slope(_noise(slope)) == pytest.approx(slope, abs=0.15)
+
+
+def test_a_uniform_grey_picture_has_no_edges_no_colour_and_is_flat():
+    values = measure(np.full((96, 96, 3), 0.5, np.float32))
+    assert values["edge_ratio"] == 0
+    assert values["flat_share"] == 1
+    assert values["colourfulness"] == pytest.approx(0, abs=1e-6)
+    assert values["colour_entropy"].max() == 0
+    assert values["ab_coverage"] == 1
+
+
+def test_shares_of_black_and_clipped_pixels_are_counted():
+    image = np.full((100, 100, 3), 0.5, np.float32)
+    image[:10], image[-20:] = 0, 1
+    values = measure(image)
+    assert values["black_share"] == pytest.approx(0.1)
+    assert values["clipped_share"] == pytest.approx(0.2)
+
+
+def test_orientation_tells_stripes_from_each_other():
+    stripes = _grey((np.arange(128) // 8 % 2 * 0.5 + 0.25)[:, None] + np.zeros((1, 128), np.float32))
+    assert np.median(measure(stripes)["orientation"]) > 85
+    assert np.median(measure(stripes.swapaxes(0, 1))["orientation"]) < 5
+
+
+def test_more_colours_give_more_entropy_and_coverage():
+    rng = np.random.default_rng(1)
+    blocks = np.kron(rng.uniform(0, 1, (24, 24, 3)), np.ones((4, 4, 1)))
+    colourful, grey = measure(blocks), measure(_grey(blocks.mean(-1)))
+    for name in ("colourfulness", "ab_coverage", "colour_entropy"):
+        assert colourful[name].mean() > grey[name].mean(), name
+
+
+def test_distance_is_zero_for_equal_sets_and_one_for_a_shift_by_a_standard_deviation():
+    values = np.random.default_rng(2).normal(3, 2, 4000)
+    assert distance(values, values) == 0
+    assert distance(values + values.std(), values) == pytest.approx(1)
+
+
+def test_a_second_real_set_is_the_yardstick():
+    sets = [pool([measure(_grey(_noise(-2, seed=seed + 10 * s))) for seed in range(3)]) for s in range(3)]
+    for found in compare(*sets):
+        assert found.yardstick == distance(sets[2][found.name], sets[1][found.name])
+        assert np.isfinite(found.distance)
+
+
+@pytest.fixture(scope="module")
+def photos(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("photos")
+    for seed in range(4):
+        image = np.stack([_noise(-2, 144, 3 * seed + c) for c in range(3)], axis=-1)
+        Image.fromarray((image.clip(0, 1) * 255).astype(np.uint8)).save(folder / f"{seed}.png")
+    return folder
+
+
+def test_photographs_and_the_dataset_made_from_them_are_seen_alike(photos, tmp_path):
+    """The RAW of a photograph holds its light, but for exposure, so what does not depend on that stays."""
+    size = ("--width", "144", "--height", "144", "--images", str(photos))
+    main(["generate", str(tmp_path / "data"), "--count", "4", *size, "--quiet"])
+    main(
+        [
+            "inspect",
+            str(tmp_path / "data"),
+            "--reference",
+            str(photos),
+            "--out",
+            str(tmp_path / "out"),
+            "--quiet",
+        ]
+    )
+    found = json.loads((tmp_path / "out" / "statistics.json").read_text())
+    by_name = {row["name"]: row for row in found["statistics"]}
+    assert set(by_name) == set(TITLES)
+    assert by_name["spectrum_slope"]["mean"] == pytest.approx(
+        by_name["spectrum_slope"]["reference_mean"], abs=0.1
+    )
+    assert by_name["orientation"]["mean"] == pytest.approx(by_name["orientation"]["reference_mean"], abs=2)
+    assert by_name["contrast"]["mean"] == pytest.approx(by_name["contrast"]["reference_mean"], abs=0.1)
+    assert (tmp_path / "out" / "statistics.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["nowhere"], "nowhere: is neither a dataset nor a folder"),
+        (["PHOTOS", "--reference", "nowhere"], "nowhere: is neither a dataset nor a folder"),
+        (["PHOTOS", "--other", "PHOTOS"], "--other needs --reference"),
+        (["PHOTOS", "--limit", "0"], "--limit 0"),
+    ],
+)
+def test_bad_input_is_one_line(photos, arguments, words, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(["inspect", *(a.replace("PHOTOS", str(photos)) for a in arguments), "--quiet"])
+    assert stop.value.code == 2
+    assert words in " ".join(capsys.readouterr().err.split())
