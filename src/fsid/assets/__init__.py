@@ -1,5 +1,6 @@
 """Everything a scene is made of: name and seed -> mesh, name and variant -> material maps."""
 
+from fsid.assets.backgrounds import BACKGROUND_PARTS, build_background, sweep_radius_m, table_size_m
 from fsid.assets.kinds import PART_KINDS, part_kind
 from fsid.assets.maps import MaterialMaps
 from fsid.assets.mesh import Mesh
@@ -10,17 +11,23 @@ from fsid.assets.registry import (
     material_families,
     material_tile_m,
     mesh_families,
+    mesh_family_summary,
 )
 
 __all__ = [
+    "BACKGROUND_PARTS",
     "MATERIAL_VARIANTS",
     "PART_KINDS",
     "MaterialMaps",
     "Mesh",
     "bake_material",
+    "build_background",
     "build_mesh",
     "material_families",
     "material_tile_m",
     "mesh_families",
+    "mesh_family_summary",
     "part_kind",
+    "sweep_radius_m",
+    "table_size_m",
 ]

@@ -83,10 +83,11 @@ class Background:
 
     room: closed box 0 <= z <= height with floor, ceiling, wall_north (+y), wall_south, wall_east (+x),
         wall_west.
-    backdrop: the same closed box, whose north wall meets the floor in a curve; `sweep` is that sheet.
-    tabletop: the same closed box with a table in the middle whose top is at z = 0: part `table`; the floor
-        of the room lies 0.75 m below.
-    open-air: ground only, size_m wide; above it is the sky.
+    backdrop: the same closed box, whose north wall meets the floor in a curve: one sheet, `sweep`, in place
+        of floor and wall_north.
+    tabletop: the same closed box, 0.75 m lower, with a table in the middle whose top is at z = 0: part
+        `table`.
+    open-air: `ground` only, size_m wide, rolling by size_m[2] beyond the objects; above it is the sky.
     """
 
     kind: str
