@@ -3,15 +3,16 @@
 from fsid.assets.backgrounds import BACKGROUND_PARTS, build_background, sweep_radius_m, table_size_m
 from fsid.assets.kinds import PART_KINDS, part_kind
 from fsid.assets.maps import MaterialMaps
-from fsid.assets.mesh import Mesh
-from fsid.assets.registry import (
+from fsid.assets.material_registry import (
     MATERIAL_VARIANTS,
     bake_material,
-    build_mesh,
     material_families,
     material_tile_m,
+)
+from fsid.assets.mesh import Mesh
+from fsid.assets.registry import (
+    build_mesh,
     mesh_families,
-    mesh_family_summary,
 )
 
 __all__ = [
@@ -26,7 +27,6 @@ __all__ = [
     "material_families",
     "material_tile_m",
     "mesh_families",
-    "mesh_family_summary",
     "part_kind",
     "sweep_radius_m",
     "table_size_m",

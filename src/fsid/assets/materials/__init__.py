@@ -1,1 +1,1 @@
-"""Material families, one file per kind of surface; found by `fsid.assets.registry`."""
+"""Material families, one file per kind of surface; found by `fsid.assets.material_registry`."""

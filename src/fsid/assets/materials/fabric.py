@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from fsid.assets.material_registry import Layers, material_family
 from fsid.assets.patterns import axes, cells, edge, level, noise
-from fsid.assets.registry import Layers, material_family
 
 
 def _woven(rng: np.random.Generator, size: int, threads: int, kind: str) -> tuple[np.ndarray, ...]:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from fsid.assets.material_registry import Layers, material_family
 from fsid.assets.patterns import cells, edge, level, noise, scratches
-from fsid.assets.registry import Layers, material_family
 
 
 @material_family("brushed_metal", tile_m=0.3, relief_m=0.0002)

@@ -8,8 +8,8 @@ import matplotlib
 import numpy as np
 from PIL import ImageDraw, ImageFont
 
+from fsid.assets.material_registry import Layers, material_family
 from fsid.assets.patterns import Draw, axes, edge, ink, level, noise, warp
-from fsid.assets.registry import Layers, material_family
 
 _FONTS = (
     "DejaVuSans",

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from fsid.assets.material_registry import Layers, material_family
 from fsid.assets.patterns import axes, edge, level, noise, warp
-from fsid.assets.registry import Layers, material_family
 
 
 def _fibres(rng: np.random.Generator, size: int) -> tuple[np.ndarray, np.ndarray]:

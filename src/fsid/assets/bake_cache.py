@@ -1,0 +1,170 @@
+"""Baked maps on disk: a bake is a function of (source code, library versions, name, variant, size) alone.
+
+    result = unpack(pack(bake()))        whether the packed form was on disk or is made just now
+
+Packing rounds what the renderer stores as 8 bits to 8 bits and height, which slopes are made of, to 16; as
+every result has been packed, the cache can never change an image. The key is a hash of all that a bake
+depends on, so a stale entry has no name by which it could be found; what is not found any more leaves as
+the oldest when the folder grows beyond its limit.
+
+Many processes share the folder: an entry appears by atomic rename, under a name that no other process
+writes. An entry that cannot be read is baked again; a folder that cannot be written is done without.
+
+The folder is $FSID_CACHE, or $XDG_CACHE_HOME/fsid, or ~/.cache/fsid; FSID_CACHE=off keeps no files.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import os
+import tempfile
+import zipfile
+import zlib
+from collections.abc import Callable, Iterable
+from functools import cache
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+
+from fsid.assets.maps import MaterialMaps
+
+LIMIT_BYTES = 2 * 2**30
+"""Size of the folder beyond which the entries that were used longest ago are deleted."""
+
+_BYTES = ("mix", "pattern", "detail", "roughness", "metallic")
+_LEVELS = {"detail": 254}
+"""Steps between 0 and 1 where they are not 255: neutral detail, 0.5, is one of 254 exactly."""
+
+
+def cache_folder(kind: str) -> Path | None:
+    """Where entries of a kind ("materials") are kept; None where the cache is switched off."""
+    chosen = os.environ.get("FSID_CACHE", "")
+    if chosen.lower() == "off":
+        return None
+    if chosen:
+        return Path(chosen) / kind
+    home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    return Path(home) / "fsid" / kind
+
+
+@cache
+def code_key(modules: tuple[str, ...]) -> str:
+    """A hash of the sources of `modules` and of the versions of the libraries that they draw with."""
+    import matplotlib
+    import PIL
+    import scipy
+
+    versions = [np.__version__, scipy.__version__, PIL.__version__, matplotlib.__version__]
+    return content_key([*(_source(module) for module in modules), " ".join(versions).encode()])
+
+
+def content_key(parts: Iterable[bytes]) -> str:
+    """A hash of `parts` in their order, 32 hexadecimal digits."""
+    digest = hashlib.sha256()
+    for part in parts:
+        digest.update(hashlib.sha256(part).digest())
+    return digest.hexdigest()[:32]
+
+
+def cached(name: str, key: str, size: int, bake: Callable[[], MaterialMaps]) -> MaterialMaps:
+    """`bake()` as it comes out of its packed form, from the cache where it has an entry.
+
+    name: readable part of the file name. key: `content_key` of everything that the result depends on.
+    """
+    folder = cache_folder("materials")
+    if folder is None:
+        return unpack(pack(bake()), size)
+    path = folder / f"{name}-{size}-{key}.npz"
+    found = _read(path, size)
+    if found is not None:
+        return found
+    packed = pack(bake())
+    _write(path, packed)
+    return unpack(packed, size)
+
+
+def pack(maps: MaterialMaps) -> dict[str, np.ndarray]:
+    """The maps in integers, each texel as its difference from the one above: small after compression."""
+    size = len(maps.height)
+    planes = np.empty((7, size, size), np.uint8)
+    for plane, name in zip(planes, _BYTES, strict=False):
+        plane[:] = np.rint(getattr(maps, name) * np.float32(_LEVELS.get(name, 255)))
+    height = np.rint(maps.height * np.float32(65535)).astype(np.uint16)
+    height[1:] -= height[:-1].copy()
+    planes[:5, 1:] -= planes[:5, :-1].copy()
+    planes[5], planes[6] = height >> 8, height & 255
+    colours = np.array(maps.colours or np.empty((0, 3)), np.float64)
+    return {"planes": planes, "metres": np.array([maps.relief_m, maps.tile_m]), "colours": colours}
+
+
+def unpack(packed: dict[str, np.ndarray], size: int) -> MaterialMaps:
+    """The inverse of `pack` up to its rounding. Raises ValueError where the arrays are not `size` wide."""
+    planes, metres, colours = packed["planes"], packed["metres"], packed["colours"]
+    shapes = (planes.shape, metres.shape, colours.shape[1:])
+    if shapes != ((7, size, size), (2,), (3,)) or planes.dtype != np.uint8:
+        raise ValueError(f"arrays of shape {shapes}")
+    bytes_, height = planes[:5].copy(), (planes[5].astype(np.uint16) << 8) + planes[6]
+    for row in range(1, size):  # np.cumsum takes ten times as long
+        bytes_[:, row] += bytes_[:, row - 1]
+        height[row] += height[row - 1]
+    maps = {"height": height.astype(np.float32) / np.float32(65535)}
+    for plane, name in zip(bytes_, _BYTES, strict=True):
+        maps[name] = plane.astype(np.float32) / np.float32(_LEVELS.get(name, 255))
+    relief_m, tile_m = (float(m) for m in metres)
+    triple = tuple((float(r), float(g), float(b)) for r, g, b in colours) or None
+    return MaterialMaps(**maps, relief_m=relief_m, tile_m=tile_m, colours=triple)
+
+
+def _read(path: Path, size: int) -> MaterialMaps | None:
+    try:
+        with np.load(path, allow_pickle=False) as entry:
+            maps = unpack({name: entry[name] for name in ("planes", "metres", "colours")}, size)
+        os.utime(path)
+        return maps
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error):
+        return None
+
+
+def _write(path: Path, packed: dict[str, np.ndarray]) -> None:
+    buffer = BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        for name, array in packed.items():
+            with archive.open(f"{name}.npy", "w") as member:
+                np.lib.format.write_array(member, array, allow_pickle=False)
+    part = None
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, part = tempfile.mkstemp(suffix=".part", dir=path.parent)
+        with os.fdopen(handle, "wb") as file:
+            file.write(buffer.getvalue())
+        os.replace(part, path)
+        _keep_below(path.parent, LIMIT_BYTES)
+    except OSError:
+        if part is not None:
+            Path(part).unlink(missing_ok=True)
+
+
+def _keep_below(folder: Path, limit_bytes: int) -> None:
+    """Delete the entries used longest ago, and what killed processes left, until the rest fits."""
+    entries = [entry for entry in os.scandir(folder) if entry.name.endswith((".npz", ".part"))]
+    stats = []
+    for entry in entries:
+        try:
+            stats.append((entry.stat(), entry.path))
+        except FileNotFoundError:
+            continue  # another process was faster
+    used = sum(stat.st_size for stat, _ in stats)
+    for stat, path in sorted(stats, key=lambda item: item[0].st_mtime):
+        if used <= limit_bytes:
+            break
+        Path(path).unlink(missing_ok=True)
+        used -= stat.st_size
+
+
+def _source(module: str) -> bytes:
+    spec = importlib.util.find_spec(module)
+    assert spec is not None, module
+    assert spec.origin is not None, module
+    return Path(spec.origin).read_bytes()
