@@ -1,7 +1,8 @@
 """How fast the sensor is: python bench/sensor.py [MEGAPIXELS].
 
-Per operation: ns per pixel, the time of a memory copy of the same array, and that of the
-formula transcribed directly into NumPy (tests/sensor_transcribed.py). One thread; the best of five runs.
+Per operation, NumPy and torch: ns per pixel, in times of a memory copy of the same array, and how many times
+as fast as the formula written out in NumPy (tests/sensor_transcribed.py; for counts, numpy's own). All of an
+operation's ways take turns in one run, one thread each, and the best of seven counts.
 """
 
 from __future__ import annotations
@@ -10,61 +11,83 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import torch
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 import sensor_transcribed as transcribed
 from fsid.sensor import Raw, add_noise, load_profile, mosaic, noisy_from_clean, pack, quantise, unprocess
 from fsid.sensor.colour import srgb_to_camera_matrix
+from fsid.sensor.formula import stored, with_noise
 from fsid.sensor.poisson import poisson
 
-RUNS = 5
+RUNS = 7
+Work = Callable[[], object]
 
 
-def seconds(work: Callable[[], object]) -> float:
-    """Best time of several runs, after one that warms up."""
-    work()
-    times = []
-    for _ in range(RUNS):
-        start = time.perf_counter()
-        work()
-        times.append(time.perf_counter() - start)
-    return min(times)
+def seconds(works: list[Work | None]) -> list[float]:
+    """Best time of each, taking turns, after one round that warms up; nan for None."""
+    best = [float("inf") if work else float("nan") for work in works]
+    for run in range(RUNS + 1):
+        for place, work in enumerate(works):
+            if work is not None:
+                start = time.perf_counter()
+                work()
+                if run:
+                    best[place] = min(best[place], time.perf_counter() - start)
+    return best
 
 
-def report(
-    name: str, work: Callable[[], object], array: np.ndarray, pixels: int, reference: float | None = None
-) -> None:
-    """One line; reference: seconds of the direct formula, where there is one to compare with."""
-    copy, own = seconds(array.copy), seconds(work)
-    line = f"{name:32s} {1e9 * own / pixels:7.2f} ns/px   {own / copy:6.1f} x copy"
-    print(line if reference is None else f"{line}   {reference / own:5.1f} x faster than direct")
+def report(name: str, array: np.ndarray, own: Work, tensors: Work | None, direct: Work | None = None) -> None:
+    """One line. own: with arrays; tensors: with tensors; direct: the formula written out."""
+    pixels = array.shape[0] * array.shape[1]
+    copy, *times, written_out = seconds([array.copy, own, tensors, direct])
+    columns = [f"{1e9 * t / pixels:8.2f} {t / copy:7.1f} {written_out / t:7.1f}" for t in times]
+    print(f"{name:28s} {' |'.join(columns)}".replace("nan", "  -"))
 
 
 def main(megapixels: float) -> None:
+    torch.set_num_threads(1)
     side = round((megapixels * 1e6) ** 0.5 / 2) * 2
     rng = np.random.default_rng(0)
-    x = rng.random((side, side), np.float32)
-    photo = rng.random((side, side, 3), np.float32)
+    x, photo = rng.random((side, side), np.float32), rng.random((side, side, 3), np.float32)
     profile = load_profile("pixel6")
-    level, matrix, gains = profile.level(3200), profile.xyz_to_camera[0], (2.1, 1.0, 1.7)
-    raw = Raw(x, profile.cfa, 64, 1023, gains, matrix)
-    pixels = x.size
-    noise = seconds(lambda: transcribed.noise(rng, x, level, raw.cfa))
-    report("noise", lambda: add_noise(rng, raw, level), x, pixels, noise)
-    report("noise and quantisation", lambda: noisy_from_clean(rng, raw, 3200, level), x, pixels)
-    report("quantisation", lambda: quantise(raw), x, pixels)
+    cfa, level = profile.cfa, profile.level(3200)
+    matrix, gains = profile.xyz_to_camera[0], (2.1, 1.0, 1.7)
+    raw = Raw(x, cfa, 64, 1023, gains, matrix)
+    light, picture = torch.from_numpy(x), torch.from_numpy(photo)
+    packed = pack(light, cfa)
+    k, sigma2 = (torch.tensor(v, dtype=torch.float32)[:, None, None] for v in (level.k, level.sigma2))
     camera = srgb_to_camera_matrix(matrix)
-    direct = seconds(lambda: transcribed.unprocess(photo, camera, gains))
-    report("unprocessing", lambda: unprocess(photo, matrix, gains), photo, pixels, direct)
-    report("mosaic", lambda: mosaic(photo, raw.cfa), x, pixels)
-    report("pack", lambda: pack(x, raw.cfa), x, pixels, seconds(lambda: transcribed.pack(x, raw.cfa)))
-    for name, electrons in (("0 .. 10", 10.0), ("0 .. 100", 100.0), ("0 .. 5000", 5000.0)):
+
+    def noise() -> Any:
+        return with_noise(packed, torch.randn_like(packed), k, sigma2)
+
+    print(f"{side}x{side}, pixel6 at ISO 3200{'NumPy':>15s}{'torch':>25s}")
+    print(f"{'':28s} {' |'.join(2 * ['   ns/px  x copy x faster'])}")
+    report(
+        "noise", x, lambda: add_noise(rng, raw, level), noise, lambda: transcribed.noise(rng, x, level, cfa)
+    )
+    both = lambda: noisy_from_clean(rng, raw, 3200, level)  # noqa: E731
+    report("noise and quantisation", x, both, lambda: stored(noise(), 64, 959))
+    report("quantisation", x, lambda: quantise(raw), lambda: stored(packed, 64, 959))
+    report(
+        "unprocessing",
+        photo,
+        lambda: unprocess(photo, matrix, gains),
+        lambda: unprocess(picture, matrix, gains),
+        lambda: transcribed.unprocess(photo, camera, gains),
+    )
+    report("mosaic", x, lambda: mosaic(photo, cfa), lambda: mosaic(picture, cfa))
+    report("pack", x, lambda: pack(x, cfa), lambda: pack(light, cfa), lambda: transcribed.pack(x, cfa))
+    for electrons in (1, 10, 100, 5000):
         lam = x * np.float32(electrons)
-        numpy = seconds(lambda lam=lam: rng.poisson(lam))
-        report(f"Poisson, {name} electrons", lambda lam=lam: poisson(rng, lam), x, pixels, numpy)
+        counts, tensor = lambda lam=lam: poisson(rng, lam), torch.from_numpy(lam)
+        numpy = lambda lam=lam: rng.poisson(lam)  # noqa: E731
+        report(f"Poisson, 0..{electrons} electrons", x, counts, lambda t=tensor: torch.poisson(t), numpy)
 
 
 if __name__ == "__main__":

