@@ -1,14 +1,15 @@
 """Shards: WebDataset tar files that appear whole or not at all.
 
-A shard is written under a hidden name and renamed when it is complete, so what exists is finished and what
-is missing is the remaining work: there is no other bookkeeping. All tar metadata is constant (time 0,
-owner 0), so equal samples give equal shards.
+A shard is written under a hidden name of its process, flushed to the disk and renamed, so what exists is
+finished and what is missing is the remaining work: there is no other bookkeeping. All tar metadata is
+constant (time 0, owner 0), so equal samples give equal shards, and of two writers either may be last.
 """
 
 from __future__ import annotations
 
 import io
 import os
+import socket
 import tarfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -23,8 +24,15 @@ def shard_path(folder: Path, number: int) -> Path:
 
 
 def part_path(path: Path) -> Path:
-    """Where a shard is written before it gets its name."""
-    return path.with_name(f".{path.name}.part")
+    """Where this process writes a shard before it gets its name."""
+    return path.with_name(f".{path.name}.{socket.gethostname()}-{os.getpid()}.part")
+
+
+def remove_parts(folder: Path) -> None:
+    """Remove what killed writers left in a dataset's folder. One that still writes fails, harmlessly."""
+    for pattern in (".shard-*.part", "config.yaml.part", "README.md.part"):
+        for part in folder.glob(pattern):
+            part.unlink(missing_ok=True)
 
 
 def find_shards(folder: Path) -> list[Path]:
@@ -42,13 +50,19 @@ def write_shard(path: Path, samples: Iterable[tuple[str, Mapping[str, bytes]]]) 
     part = part_path(path)
     with _disk_refusals(path):
         try:
-            with tarfile.open(part, "w", format=tarfile.USTAR_FORMAT) as tar:
+            with (
+                part.open("wb") as file,
+                tarfile.open(fileobj=file, mode="w", format=tarfile.USTAR_FORMAT) as tar,
+            ):
                 for key, files in samples:
                     for extension, data in files.items():
                         member = tarfile.TarInfo(f"{key}.{extension}")
                         member.size = len(data)
                         member.mode = 0o644
                         tar.addfile(member, io.BytesIO(data))
+                tar.close()
+                file.flush()
+                os.fsync(file.fileno())
             os.replace(part, path)
         finally:
             part.unlink(missing_ok=True)

@@ -1,0 +1,83 @@
+"""The crew of `crew.py` on a Ray cluster: one actor per worker.
+
+Actors are used and not `ray.util.multiprocessing.Pool`, which goes on giving tasks to an actor that died. The
+cluster's machines need the same FSID installed and the dataset's folder under the same path.
+"""
+
+from __future__ import annotations
+
+import logging
+from typing import Any
+
+from fsid.dataset.crew import Lost, MakeWork, do_task
+from fsid.errors import FsidError
+
+
+class _Member:
+    """What runs on the cluster."""
+
+    def __init__(self, make_work: MakeWork, has_gpu: bool) -> None:
+        import ray
+
+        self._work = make_work(int(ray.get_gpu_ids()[0]) if has_gpu else None)
+
+    def do(self, task: Any) -> Any:
+        return do_task(self._work, task)
+
+
+class RayCrew:
+    """Actors of one CPU each on a cluster. address: "auto", "ray://HOST:10001", or "local" for one here.
+
+    workers_per_gpu: Ray gives every worker 1 / workers_per_gpu of a GPU; 0 asks for none.
+    Raises FsidError where no cluster answers or the cluster has fewer CPUs than `size`.
+    """
+
+    def __init__(self, address: str, size: int, make_work: MakeWork, workers_per_gpu: int = 0) -> None:
+        import ray
+
+        self._ray, self._size, self._make_work = ray, size, make_work
+        self._owns = not ray.is_initialized()
+        try:
+            if self._owns:
+                ray.init(address=address, log_to_driver=False, logging_level=logging.ERROR)
+        except (ConnectionError, ValueError, RuntimeError) as error:
+            reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+            raise FsidError(f"--ray {address}: no Ray cluster answers there ({reason})") from None
+        cpus = int(ray.cluster_resources().get("CPU", 0))
+        if cpus < size:
+            self.stop()
+            raise FsidError(f"--workers {size}: the Ray cluster has {cpus} CPUs, one per worker is needed")
+        share = 1 / workers_per_gpu if workers_per_gpu else 0
+        self._has_gpu = share > 0
+        threads = {"env_vars": {"LP_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}}
+        self._actor = ray.remote(num_cpus=1, num_gpus=share, runtime_env=threads)(_Member)
+        self._members: dict[int, Any] = {}
+        self._pending: dict[Any, int] = {}
+
+    @property
+    def size(self) -> int:
+        return self._size
+
+    def start(self, worker: int) -> None:
+        if worker in self._members:
+            self._ray.kill(self._members[worker])
+        self._members[worker] = self._actor.remote(self._make_work, self._has_gpu)
+
+    def send(self, worker: int, task: Any) -> None:
+        self._pending[self._members[worker].do.remote(task)] = worker
+
+    def wait(self) -> list[tuple[int, Any]]:
+        ready, _ = self._ray.wait(list(self._pending), num_returns=1)
+        return [(self._pending.pop(reference), self._result(reference)) for reference in ready]
+
+    def _result(self, reference: Any) -> Any:
+        try:
+            return self._ray.get(reference)
+        except self._ray.exceptions.RayError as error:
+            return Lost(type(error).__name__)
+
+    def stop(self) -> None:
+        for member in getattr(self, "_members", {}).values():
+            self._ray.kill(member)
+        if self._owns:
+            self._ray.shutdown()

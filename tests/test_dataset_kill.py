@@ -1,0 +1,246 @@
+"""Whatever dies, and whenever: run again, and the set is whole and the same bytes as if nothing had died."""
+
+from __future__ import annotations
+
+import os
+import random
+import resource
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from fsid.config import load_settings
+from fsid.dataset import GenerateConfig, generate, shard_keys
+from fsid.dataset.crew import TRIES, LocalCrew, run
+from fsid.errors import FsidError
+
+KILLS = 50
+COUNT, SHARD = 96, 4
+SCENES = ["scene.objects=[1,2]", "texture_size=64", "supersampling=1", "width=64", "height=48"]
+
+SCRIPT = """
+import sys
+from pathlib import Path
+from fsid.config import load_settings
+from fsid.dataset import GenerateConfig, generate
+out, count, shard, *settings = sys.argv[1:]
+config = load_settings(GenerateConfig, None, settings)
+generate(Path(out), config, count=int(count), seed=3, workers=2, shard_size=int(shard))
+"""
+
+
+def start(out: Path, count: int, shard: int, settings: list[str]) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-c", SCRIPT, str(out), str(count), str(shard), *settings]
+    return subprocess.Popen(command, stderr=subprocess.PIPE)
+
+
+def workers_of(parent: int) -> list[int]:
+    try:
+        children = Path(f"/proc/{parent}/task/{parent}/children").read_text().split()
+        return [int(pid) for pid in children if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+    except (OSError, ValueError):
+        return []
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir() if path.suffix == ".tar"}
+
+
+def killed(process: subprocess.Popen[bytes], chance: random.Random, parent_share: float) -> bool:
+    """Kill one of the workers, or their parent, at a random moment; False where nothing was there."""
+    time.sleep(chance.uniform(0.0, 0.5))
+    victims = workers_of(process.pid)
+    if process.poll() is not None or not victims:
+        return False
+    victim = process.pid if chance.random() < parent_share else chance.choice(victims)
+    try:
+        os.kill(victim, signal.SIGKILL)
+    except ProcessLookupError:
+        return False
+    if victim == process.pid:
+        process.wait()
+    return True
+
+
+def disturbed(out: Path, count: int, shard: int, settings: list[str], kills: int, seed: int) -> int:
+    """Run until the set is made, killing on the way at most `kills` times; returns how many it were."""
+    chance = random.Random(seed)
+    done = 0
+    process = start(out, count, shard, settings)
+    while done < kills:
+        done += killed(process, chance, parent_share=0.2)
+        if process.poll() is not None:
+            message = process.communicate()[1].decode()
+            if process.returncode == 0:
+                return done
+            assert process.returncode == -signal.SIGKILL or "FsidError" in message, message
+            process = start(out, count, shard, settings)
+    message = process.communicate()[1].decode()
+    assert process.returncode == 0 or "FsidError" in message, message
+    return done
+
+
+@pytest.fixture(scope="module")
+def tiny(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    """Settings of a source that costs next to nothing: small pictures."""
+    folder = tmp_path_factory.mktemp("tiny")
+    rng = np.random.default_rng(0)
+    for i in range(3):
+        Image.fromarray(rng.integers(0, 255, (48, 48, 3), np.uint8)).save(folder / f"{i}.png")
+    return [f"images={folder}", "width=32", "height=32"]
+
+
+def finish(out: Path, settings: list[str], count: int, shard: int) -> None:
+    generate(out, load_settings(GenerateConfig, None, settings), count=count, seed=3, shard_size=shard)
+
+
+def check_whole(out: Path, expected: dict[str, bytes], count: int) -> None:
+    assert content(out) == expected
+    keys = [key for path in sorted(out.glob("shard-*.tar")) for key in shard_keys(path)]
+    assert keys == [f"{i:08d}" for i in range(count)]
+    assert not list(out.glob("*.part"))
+
+
+def test_fifty_kills_of_workers_and_parent_change_nothing(tiny: list[str], tmp_path: Path) -> None:
+    finish(tmp_path / "calm", tiny, COUNT, SHARD)
+    expected = content(tmp_path / "calm")
+    kills = run_number = 0
+    while kills < KILLS:
+        run_number += 1
+        out = tmp_path / f"{run_number}"
+        kills += disturbed(out, COUNT, SHARD, tiny, KILLS - kills, seed=run_number)
+        finish(out, tiny, COUNT, SHARD)
+        check_whole(out, expected, COUNT)
+    assert kills == KILLS
+
+
+def test_kills_while_rendering_change_nothing(tmp_path: Path) -> None:
+    finish(tmp_path / "calm", SCENES, 6, 2)
+    assert disturbed(tmp_path / "out", 6, 2, SCENES, kills=4, seed=1) > 0
+    finish(tmp_path / "out", SCENES, 6, 2)
+    check_whole(tmp_path / "out", content(tmp_path / "calm"), 6)
+
+
+def test_a_run_keeps_others_out_of_its_folder(tiny: list[str], tmp_path: Path) -> None:
+    process = start(tmp_path, 2000, SHARD, tiny)
+    try:
+        while not list(tmp_path.glob("shard-*.tar")):
+            assert process.poll() is None
+            time.sleep(0.05)
+        with pytest.raises(FsidError, match="another fsid generate"):
+            finish(tmp_path, tiny, 2000, SHARD)
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def test_a_full_disk_is_one_line_and_the_next_run_finishes(tiny: list[str], tmp_path: Path) -> None:
+    """A limit on the size of files stands for the full disk: writing fails in the middle of a shard."""
+    out, soft = tmp_path / "out", resource.getrlimit(resource.RLIMIT_FSIZE)
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # Python's own choice, and what makes it an OSError
+    resource.setrlimit(resource.RLIMIT_FSIZE, (30_000, soft[1]))
+    try:
+        with pytest.raises(FsidError, match=r"shard-0000\d\.tar: cannot be written \(File too large\)"):
+            finish(out, tiny, 8, SHARD)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, soft)
+    assert [path.name for path in out.iterdir()] == ["config.yaml"]
+    finish(out, tiny, 8, SHARD)
+    finish(tmp_path / "calm", tiny, 8, SHARD)
+    check_whole(out, content(tmp_path / "calm"), 8)
+
+
+def test_a_folder_that_cannot_be_written_is_one_line(tiny: list[str], tmp_path: Path) -> None:
+    finish(tmp_path, tiny, 4, SHARD)
+    with immutable(tmp_path), pytest.raises(FsidError, match=r"shard-00001\.tar: cannot be written"):
+        finish(tmp_path, tiny, 8, SHARD)
+    finish(tmp_path, tiny, 8, SHARD)
+    assert len(content(tmp_path)) == 2
+
+
+class immutable:  # noqa: N801  reads as what it does
+    """A folder without permission to write; root, whom permissions do not stop, marks it immutable."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def __enter__(self) -> None:
+        self._folder.chmod(0o555)
+        if (
+            os.geteuid() == 0
+            and subprocess.run(["chattr", "+i", self._folder], capture_output=True).returncode
+        ):
+            self._folder.chmod(0o755)
+            pytest.skip("root, and the file system knows no immutable folders")
+
+    def __exit__(self, *_: object) -> None:
+        if os.geteuid() == 0:
+            subprocess.run(["chattr", "-i", self._folder], check=True)
+        self._folder.chmod(0o755)
+
+
+def make_deadly(gpu: int | None):  # the work of a worker of the tests below
+    return deadly
+
+
+def deadly(task: str) -> str:
+    if task == "poison":
+        os.kill(os.getpid(), signal.SIGKILL)
+    if task == "bug":
+        raise ZeroDivisionError("of the test")
+    return task.upper()
+
+
+def test_a_task_that_kills_its_worker_is_named_after_all_others_are_done() -> None:
+    lines: list[str] = []
+    done: list[tuple[str, str]] = []
+    results = run(LocalCrew(2, make_deadly), ["a", "poison", "b"], tasks_per_worker=1, lost=lines.append)
+    with pytest.raises(FsidError, match="poison"):
+        done.extend(results)
+    assert sorted(done) == [("a", "A"), ("b", "B")]
+    assert len(lines) == TRIES
+    assert "exit code -9" in lines[0]
+
+
+def test_a_bug_in_a_worker_keeps_its_traceback() -> None:
+    with pytest.raises(RuntimeError, match="ZeroDivisionError: of the test"):
+        list(run(LocalCrew(1, make_deadly), ["bug"], tasks_per_worker=10))
+
+
+def unimportable(gpu: int | None):
+    sys.exit(3)
+
+
+def test_workers_that_cannot_start_end_the_run() -> None:
+    with pytest.raises(FsidError, match="no worker lives long enough"):
+        list(run(LocalCrew(1, unimportable), ["a", "b"], tasks_per_worker=10))
+
+
+def test_workers_are_replaced_after_some_tasks() -> None:
+    pids = [result for _, result in run(LocalCrew(1, make_pid), list(range(4)), tasks_per_worker=2)]
+    assert pids[0] == pids[1] != pids[2] == pids[3]
+
+
+def make_pid(gpu: int | None):
+    return lambda task: os.getpid()
+
+
+def test_workers_share_gpus_as_configured() -> None:
+    gpus = [
+        result for _, result in run(LocalCrew(4, make_gpu, workers_per_gpu=2), [0.5] * 4, tasks_per_worker=9)
+    ]
+    assert sorted(gpus) == [0, 0, 1, 1]
+
+
+def make_gpu(gpu: int | None):
+    def work(task: float) -> int | None:
+        time.sleep(task)  # long enough that every worker gets one
+        return gpu
+
+    return work
