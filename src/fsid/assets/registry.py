@@ -23,6 +23,7 @@ import numpy as np
 
 from fsid.assets.mesh import Mesh
 from fsid.assets.solids import Solid, assemble
+from fsid.assets.sources import PREFIX, load_source
 from fsid.assets.streams import rng_of
 from fsid.errors import FsidError
 
@@ -59,16 +60,21 @@ def mesh_family_summary(family: str) -> str:
 def build_mesh(family: str, seed: int) -> Mesh:
     """The mesh of (family, seed): metres, base on z = 0, footprint centred. Read-only arrays.
 
+    family: a registered name, or a mesh file as `fsid.assets.sources` names them, whose seed plays no part.
     The last 128 meshes stay in memory: a sampler that looks at sizes and a renderer share the work.
-    Raises FsidError for a family that does not exist.
+    Raises FsidError for a family that does not exist or a file that cannot be read.
     """
-    _discover()
-    if family not in _MESHES:
-        raise FsidError(f"mesh family '{family}' does not exist; choose one of: {', '.join(mesh_families())}")
-    mesh = assemble(_MESHES[family](rng_of(family, seed)))
+    mesh = load_source(family) if family.startswith(PREFIX) else _from_family(family, seed)
     for array in (mesh.vertices, mesh.normals, mesh.faces, mesh.face_parts):
         array.setflags(write=False)
     return mesh
+
+
+def _from_family(family: str, seed: int) -> Mesh:
+    _discover()
+    if family not in _MESHES:
+        raise FsidError(f"mesh family '{family}' does not exist; choose one of: {', '.join(mesh_families())}")
+    return assemble(_MESHES[family](rng_of(family, seed)))
 
 
 @cache

@@ -1,0 +1,12 @@
+"""Meshes that the user brings: folders of files and Sweet Home 3D libraries, as if they were families."""
+
+from fsid.assets.sources.library import (
+    PREFIX,
+    MeshSource,
+    Survey,
+    load_source,
+    mesh_sources,
+    survey_meshes,
+)
+
+__all__ = ["PREFIX", "MeshSource", "Survey", "load_source", "mesh_sources", "survey_meshes"]

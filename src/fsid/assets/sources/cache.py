@@ -1,0 +1,98 @@
+"""Cleaned meshes on disk, so that a library is read once per machine and not once per process.
+
+A mesh is (key).npz, a refusal (key).txt with its reason. The key covers the file's place, size and time and
+the version of the cleaning. Deleting the folder costs time and nothing else; a folder that cannot be
+written only makes the next process slower.
+
+The folder is $FSID_CACHE/meshes, or $XDG_CACHE_HOME/fsid/meshes, or ~/.cache/fsid/meshes; FSID_CACHE=off
+keeps no files.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import io
+import os
+import zipfile
+from pathlib import Path
+
+import numpy as np
+
+from fsid.assets.mesh import Mesh
+from fsid.assets.sources.limits import RefusedError
+
+_VERSION = 1
+"""One more whenever the same file gives another mesh."""
+
+
+def cache_key(path: Path, member: str) -> str:
+    """Name of what is made from a file as it is now. OSError where there is none."""
+    state = path.stat()
+    text = f"{_VERSION}|{path.resolve()}|{state.st_size}|{state.st_mtime_ns}|{member}"
+    return hashlib.blake2b(text.encode(), digest_size=20).hexdigest()
+
+
+def load_mesh(key: str) -> Mesh | None:
+    """The mesh stored under a key, None where there is none. Raises the RefusedError stored instead."""
+    folder = _folder()
+    if folder is None:
+        return None
+    try:
+        with np.load(folder / f"{key}.npz", allow_pickle=False) as stored:
+            return Mesh(
+                vertices=stored["vertices"],
+                normals=stored["normals"],
+                faces=stored["faces"],
+                face_parts=stored["face_parts"],
+                part_names=tuple(str(name) for name in stored["part_names"]),
+            )
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        pass
+    try:
+        reason = (folder / f"{key}.txt").read_text(encoding="utf-8")
+    except (OSError, ValueError):
+        return None
+    raise RefusedError(reason)
+
+
+def store_mesh(key: str, mesh: Mesh) -> None:
+    """Keep a mesh."""
+    buffer = io.BytesIO()
+    np.savez_compressed(
+        buffer,
+        vertices=mesh.vertices,
+        normals=mesh.normals,
+        faces=mesh.faces,
+        face_parts=mesh.face_parts,
+        part_names=np.array(mesh.part_names),
+    )
+    _replace(f"{key}.npz", buffer.getvalue())
+
+
+def store_refusal(key: str, reason: str) -> None:
+    """Keep why there is no mesh."""
+    _replace(f"{key}.txt", reason.encode())
+
+
+def _replace(name: str, data: bytes) -> None:
+    """A whole file under its name at once, or nothing at all; every process writes one of its own."""
+    folder = _folder()
+    if folder is None:
+        return
+    part = folder / f"{name}.{os.getpid()}.part"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        part.write_bytes(data)
+        os.replace(part, folder / name)
+    except OSError:
+        with contextlib.suppress(OSError):
+            part.unlink(missing_ok=True)
+
+
+def _folder() -> Path | None:
+    chosen = os.environ.get("FSID_CACHE", "")
+    if chosen.lower() == "off":
+        return None
+    home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    return Path(chosen or f"{home}/fsid") / "meshes"

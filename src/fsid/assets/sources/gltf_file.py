@@ -1,0 +1,131 @@
+"""The geometry of a glTF file, and nothing else of it, as a document that is safe to hand on.
+
+A glTF document may refer to other files, nest nodes without end and declare accessors of any size. Here its
+buffers are fetched (from the same folder or below, never above), its numbers compared with the limits, and
+pictures, materials, animations and extensions dropped: what is left is meshes, nodes and bytes.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+import struct
+from collections.abc import Callable
+from typing import Any
+
+from fsid.assets.sources.limits import MAX_DEPTH, MAX_FILE_BYTES, MAX_NODES, MAX_TRIANGLES, RefusedError
+
+Fetch = Callable[[str], bytes]
+"""Relative name -> content; raises RefusedError."""
+
+_KEPT = ("asset", "scene", "scenes", "nodes", "meshes", "accessors", "bufferViews")
+_JSON, _BIN = 0x4E4F534A, 0x004E4942
+_PACKED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression")
+_TRIANGLE_MODES = (4, 5)
+
+
+def plain_gltf(data: bytes, fetch: Fetch) -> tuple[bytes, dict[str, bytes]]:
+    """A .glb or .gltf as (JSON document, its buffers by name); meshes carry their material's name.
+
+    Raises RefusedError; any other exception means that the document is malformed.
+    """
+    document, binary = _split(data)
+    for name in document.get("extensionsRequired", ()):
+        if name in _PACKED:
+            raise RefusedError(f"compressed with {name}, which is not supported")
+    buffers = _buffers(document, binary, fetch)
+    _check_counts(document)
+    _check_graph(document)
+    plain = {key: document[key] for key in _KEPT if key in document}
+    plain["buffers"] = [{"uri": name, "byteLength": len(content)} for name, content in buffers.items()]
+    plain["meshes"] = [_named_mesh(mesh, document.get("materials", [])) for mesh in document["meshes"]]
+    return json.dumps(plain).encode(), buffers
+
+
+def _split(data: bytes) -> tuple[dict[str, Any], bytes | None]:
+    """The JSON document and the binary chunk of a .glb; of a .gltf there is only the first."""
+    if data[:4] != b"glTF":
+        return json.loads(data.decode("utf-8-sig")), None
+    chunks: dict[int, bytes] = {}
+    at = 12
+    while at + 8 <= len(data):
+        length, kind = struct.unpack_from("<II", data, at)
+        chunks.setdefault(kind, data[at + 8 : at + 8 + length])
+        at += 8 + length
+    return json.loads(chunks[_JSON].decode("utf-8")), chunks.get(_BIN)
+
+
+def _buffers(document: dict[str, Any], binary: bytes | None, fetch: Fetch) -> dict[str, bytes]:
+    out, total = {}, 0
+    for i, buffer in enumerate(document.get("buffers", [])):
+        uri = buffer.get("uri")
+        if uri is None:
+            if i or binary is None:
+                raise RefusedError("a buffer without data")
+            content = binary
+        elif uri.startswith("data:"):
+            try:
+                content = base64.b64decode(uri.partition("base64,")[2])
+            except binascii.Error:
+                raise RefusedError("a buffer that is not base64") from None
+        else:
+            content = fetch(uri)
+        total += len(content)
+        if total > MAX_FILE_BYTES:
+            raise RefusedError(f"more than {MAX_FILE_BYTES >> 20} MiB of buffers")
+        out[f"buffer{i}"] = content
+    return out
+
+
+def _check_counts(document: dict[str, Any]) -> None:
+    for accessor in document.get("accessors", []):
+        if not 0 <= accessor["count"] <= 3 * MAX_TRIANGLES:
+            raise RefusedError(f"an accessor of {accessor['count']:,} elements")
+        if "bufferView" not in accessor or "sparse" in accessor:
+            raise RefusedError("accessors without data of their own are not supported")
+
+
+def _check_graph(document: dict[str, Any]) -> None:
+    """Every node has one parent at most, depth and instanced triangles are limited."""
+    nodes = document.get("nodes", [])
+    if len(nodes) > MAX_NODES:
+        raise RefusedError(f"{len(nodes):,} nodes")
+    sizes = [_triangle_count(mesh, document["accessors"]) for mesh in document["meshes"]]
+    children = [child for node in nodes for child in node.get("children", ())]
+    if len(children) != len(set(children)):
+        raise RefusedError("a node with two parents")
+    level = set(range(len(nodes))) - set(children)
+    total = depth = reached = 0
+    while level:
+        reached += len(level)
+        total += sum(sizes[nodes[i]["mesh"]] for i in level if "mesh" in nodes[i])
+        level = {child for i in level for child in nodes[i].get("children", ())}
+        depth += 1
+        if depth > MAX_DEPTH or total > MAX_TRIANGLES:
+            raise RefusedError(
+                f"more than {MAX_DEPTH} levels or {MAX_TRIANGLES:,} triangles in the scene graph"
+            )
+    if reached != len(nodes):
+        raise RefusedError("nodes in a circle")
+
+
+def _triangle_count(mesh: dict[str, Any], accessors: list[dict[str, Any]]) -> int:
+    shown = [p for p in mesh["primitives"] if p.get("mode", 4) in _TRIANGLE_MODES]
+    return sum(accessors[p.get("indices", p["attributes"]["POSITION"])]["count"] for p in shown) // 3
+
+
+def _named_mesh(mesh: dict[str, Any], materials: list[dict[str, Any]]) -> dict[str, Any]:
+    """Positions and indices of a mesh, under the name of its material where it has only one."""
+    primitives = [
+        {
+            "attributes": {"POSITION": p["attributes"]["POSITION"]},
+            **{key: p[key] for key in ("indices", "mode") if key in p},
+        }
+        for p in mesh["primitives"]
+        if p.get("mode", 4) in _TRIANGLE_MODES
+    ]
+    used = {p.get("material") for p in mesh["primitives"]}
+    only = used.pop() if len(used) == 1 else None
+    name = mesh.get("name", "part") if only is None else materials[only].get("name", f"material{only}")
+    return {"name": str(name), "primitives": primitives}

@@ -1,0 +1,27 @@
+"""How much of somebody else's file is read: beyond this it is refused, whatever its headers promise.
+
+Mesh files come from the internet. A few hundred bytes can declare 10^12 vertices, a zip of 40 kB can unpack
+to gigabytes, and a scene graph can name itself as its child. Every number that a file states is compared
+with these limits before anything is allocated for it.
+"""
+
+from __future__ import annotations
+
+MAX_FILE_BYTES = 256 * 2**20
+"""Of one mesh file, unpacked, and of all that it refers to."""
+
+MAX_ARCHIVE_BYTES = 2 * 2**30
+MAX_DIRECTORY_BYTES = 32 * 2**20
+"""Of the directory at a zip's end: some 300,000 members."""
+
+MAX_CATALOGUE_BYTES = 16 * 2**20
+MAX_TRIANGLES = 4_000_000
+"""As read. What is kept is `cleaning.KEPT_TRIANGLES`."""
+
+MAX_NODES = 5_000
+MAX_DEPTH = 200
+"""Of a glTF scene graph."""
+
+
+class RefusedError(Exception):
+    """Why a mesh is not used: a short clause without the file's name, which the caller knows."""

@@ -1,0 +1,101 @@
+"""Bytes of a mesh file -> `Triangles`, through `trimesh`, with every stated number checked beforehand."""
+
+from __future__ import annotations
+
+import io
+import re
+
+import numpy as np
+
+from fsid.assets.sources.cleaning import Triangles
+from fsid.assets.sources.gltf_file import Fetch, plain_gltf
+from fsid.assets.sources.limits import MAX_FILE_BYTES, MAX_TRIANGLES, RefusedError
+
+MESH_SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl")
+
+_Y_UP = (".glb", ".gltf", ".obj")
+"""glTF by its standard, OBJ by custom; PLY and STL come from scanners and printers with z up."""
+
+
+def read_triangles(data: bytes, suffix: str, fetch: Fetch) -> Triangles:
+    """The triangles of a file in its own unit, turned so that z is up; one part per material.
+
+    data: the file. suffix: one of MESH_SUFFIXES. fetch: for the buffers that a .gltf refers to; nothing else
+    is ever looked up. Raises RefusedError, whatever is wrong with the file.
+    """
+    if len(data) > MAX_FILE_BYTES:
+        raise RefusedError(f"larger than {MAX_FILE_BYTES >> 20} MiB")
+    try:
+        triangles = _joined(_geometries(data, suffix, fetch))
+    except (RefusedError, KeyboardInterrupt):
+        raise
+    except Exception as error:  # what a reader of foreign formats may raise has no end
+        raise RefusedError(f"cannot be read ({type(error).__name__}: {_one_line(error)})") from None
+    if suffix in _Y_UP:
+        x, y, z = triangles.vertices.T
+        return Triangles(np.stack([x, -z, y], axis=-1), triangles.faces, triangles.parts, triangles.names)
+    return triangles
+
+
+def _geometries(data: bytes, suffix: str, fetch: Fetch) -> list[tuple[str, np.ndarray, np.ndarray]]:
+    """(part name, vertices, faces) of every placed piece of a file."""
+    import trimesh  # slow to import, and only users of mesh files need it
+
+    resolver: dict[str, bytes] = {}
+    if suffix in (".glb", ".gltf"):
+        data, resolver = plain_gltf(data, fetch)
+        suffix = ".gltf"
+    elif suffix == ".obj":
+        data, resolver = _named_materials(data)
+    elif suffix == ".ply":
+        _check_ply(data)
+    loaded = trimesh.load_scene(io.BytesIO(data), suffix[1:], resolver=resolver, process=False)
+    pieces = []
+    for node in loaded.graph.nodes_geometry:
+        matrix, name = loaded.graph[node]
+        geometry = loaded.geometry[name]
+        if hasattr(geometry, "faces"):
+            points = geometry.vertices @ matrix[:3, :3].T + matrix[:3, 3]
+            pieces.append((str(name), points, geometry.faces))
+    return pieces
+
+
+def _named_materials(data: bytes) -> tuple[bytes, dict[str, bytes]]:
+    """An OBJ that names its materials from a list made here: the file's own .mtl is never opened."""
+    names = sorted(set(re.findall(rb"^usemtl[ \t]+(\S[^\r\n]*?)[ \t]*\r?$", data, re.MULTILINE)))
+    body = re.sub(rb"^mtllib[^\n]*$", b"", data, flags=re.MULTILINE)
+    library = b"".join(b"newmtl " + name + b"\n" for name in [*names, b"unused"])  # one alone is ignored
+    return b"mtllib names\n" + body, {"names": library}
+
+
+def _check_ply(data: bytes) -> None:
+    """Elements stated in the header must fit into the file: none takes less than a byte."""
+    header = data[: data.find(b"end_header")]
+    if len(header) > 100_000:
+        raise RefusedError("a header without end")
+    for count in re.findall(rb"^element\s+\S+\s+(\S+)", header, re.MULTILINE):
+        if not count.isdigit() or len(count) > 18 or int(count) > min(len(data), 3 * MAX_TRIANGLES):
+            raise RefusedError(f"{count.decode('latin-1')[:20]} elements in a file of {len(data):,} bytes")
+
+
+def _joined(pieces: list[tuple[str, np.ndarray, np.ndarray]]) -> Triangles:
+    total = sum(len(faces) for _, _, faces in pieces)
+    if not total:
+        raise RefusedError("no triangles")
+    if total > MAX_TRIANGLES:
+        raise RefusedError(f"{total:,} triangles")
+    names = list(dict.fromkeys(name for name, _, _ in pieces))
+    vertices, faces, parts, start = [], [], [], 0
+    for name, points, corners in pieces:
+        points, corners = np.asarray(points, np.float64), np.asarray(corners, np.int64)
+        if len(corners) and not 0 <= corners.min() <= corners.max() < len(points):
+            raise RefusedError("a face that names a vertex which does not exist")
+        vertices.append(points.reshape(-1, 3))
+        faces.append(corners.reshape(-1, 3) + start)
+        parts.append(np.full(len(corners), names.index(name)))
+        start += len(points)
+    return Triangles(np.concatenate(vertices), np.concatenate(faces), np.concatenate(parts), tuple(names))
+
+
+def _one_line(error: BaseException) -> str:
+    return " ".join(str(error).split())[:120]

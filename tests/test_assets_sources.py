@@ -1,0 +1,222 @@
+"""Meshes that users bring: whatever the file, what comes out is the contract of `Mesh`, or one reason."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from fsid.assets import build_mesh
+from fsid.assets.sources import load_source, mesh_sources, survey_meshes
+from fsid.assets.sources.cleaning import KEPT_PARTS, KEPT_TRIANGLES, Triangles, clean
+from fsid.errors import FsidError
+
+FURNITURE = Path("/usr/share/sweethome3d/furniture")
+CATALOGUE = "PluginFurnitureCatalog.properties"
+
+
+@pytest.fixture(autouse=True)
+def own_cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
+    folder = tmp_path_factory.mktemp("cache")
+    monkeypatch.setenv("FSID_CACHE", str(folder))
+    survey_meshes.cache_clear()
+    return folder
+
+
+def cube_obj(*, unit: float = 1.0, material: str = "oak") -> str:
+    cube = trimesh.creation.box((1.0, 2.0, 3.0))
+    lines = [f"v {x * unit} {y * unit} {z * unit}" for x, y, z in cube.vertices]
+    return "\n".join(
+        [*lines, f"usemtl {material}", *(f"f {a + 1} {b + 1} {c + 1}" for a, b, c in cube.faces)]
+    )
+
+
+def triangles_of(mesh: trimesh.Trimesh, *names: str) -> Triangles:
+    faces = np.asarray(mesh.faces, np.int64)
+    parts = np.arange(len(faces)) * len(names) // len(faces)
+    return Triangles(np.asarray(mesh.vertices, float), faces, parts, names)
+
+
+def assert_contract(mesh) -> None:
+    """What every source of geometry promises."""
+    assert mesh.vertices.dtype == mesh.normals.dtype == np.float32
+    assert mesh.faces.dtype == mesh.face_parts.dtype == np.int32
+    assert np.isfinite(mesh.vertices).all()
+    np.testing.assert_allclose(np.linalg.norm(mesh.normals, axis=1), 1.0, atol=1e-4)
+    assert mesh.faces.min() >= 0
+    assert mesh.faces.max() < len(mesh.vertices)
+    assert set(mesh.face_parts) == set(range(len(mesh.part_names)))
+    low, high = mesh.vertices.min(0), mesh.vertices.max(0)
+    np.testing.assert_allclose((low + high)[:2], 0.0, atol=2e-5 * max(1, *(high - low)))
+    assert abs(low[2]) < 1e-5 * max(1, *(high - low))
+    a, b, c = (mesh.vertices[mesh.faces[:, i]].astype(float) for i in range(3))
+    assert (np.linalg.norm(np.cross(b - a, c - a), axis=1) > 1e-11).all()
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".gltf", ".obj", ".ply", ".stl"])
+def test_every_format_gives_the_same_solid(tmp_path: Path, suffix: str):
+    solid = trimesh.creation.box((0.3, 0.2, 0.5))
+    if suffix in (".glb", ".gltf", ".obj"):  # y up
+        solid.apply_transform(trimesh.transformations.rotation_matrix(-np.pi / 2, (1, 0, 0)))
+    if suffix == ".stl":  # millimetres
+        solid.apply_scale(1000)
+    if suffix == ".gltf":
+        for name, content in trimesh.Scene([solid]).export(file_type="gltf").items():
+            (tmp_path / name).write_bytes(content)
+    else:
+        solid.export(tmp_path / f"model{suffix}")
+    (name,) = mesh_sources(tmp_path)
+    mesh = build_mesh(name, 0)
+    assert_contract(mesh)
+    np.testing.assert_allclose(np.ptp(mesh.vertices, axis=0), (0.3, 0.2, 0.5), atol=1e-5)
+    assert len(mesh.faces) == 12
+    assert len(mesh.vertices) == 24, "hard edges are kept"
+
+
+def test_normals_are_smooth_where_the_shape_is_and_hard_where_it_is_not():
+    mesh = clean(triangles_of(trimesh.creation.cylinder(radius=0.1, height=0.4, sections=48), "part"))
+    side = np.abs(mesh.normals[:, 2]) < 0.5
+    radial = mesh.vertices[side, :2] / np.linalg.norm(mesh.vertices[side, :2], axis=1, keepdims=True)
+    np.testing.assert_allclose(mesh.normals[side, :2], radial, atol=2e-3)
+    np.testing.assert_allclose(np.abs(mesh.normals[~side, 2]), 1.0, atol=1e-5)
+
+
+def test_faces_turned_inside_out_at_random_are_put_right():
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.2)
+    given = triangles_of(ball, "part")
+    faces = given.faces.copy()
+    wrong = np.random.default_rng(1).random(len(faces)) < 0.5
+    faces[wrong] = faces[wrong][:, ::-1]
+    mesh = clean(Triangles(given.vertices, faces, given.parts, given.names))
+    outward = mesh.vertices - mesh.vertices.mean(0)
+    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    assert (mesh.normals * outward).sum(1).min() > 0.99
+    assert len(mesh.vertices) == len(ball.vertices)
+
+
+def test_dense_meshes_are_thinned_and_keep_their_shape():
+    ball = trimesh.creation.icosphere(subdivisions=6, radius=0.2)
+    assert len(ball.faces) > KEPT_TRIANGLES
+    mesh = clean(triangles_of(ball, "part"))
+    assert KEPT_TRIANGLES / 3 < len(mesh.faces) <= KEPT_TRIANGLES
+    radius = np.linalg.norm(mesh.vertices - (0, 0, 0.2), axis=1)
+    assert np.abs(radius - 0.2).max() < 0.002
+
+
+def test_small_parts_are_one():
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.2)
+    mesh = clean(triangles_of(ball, *(f"m{i}" for i in range(40))))
+    assert len(mesh.part_names) == KEPT_PARTS
+    assert mesh.part_names[-1] == "other"
+    assert_contract(mesh)
+
+
+def test_degenerate_and_duplicate_triangles_and_wild_points_vanish():
+    cube = triangles_of(trimesh.creation.box((0.2, 0.2, 0.2)), "part")
+    vertices = np.vstack([cube.vertices, [(np.nan, 0, 0), (np.inf, 1, 1)]])
+    extra = [(0, 0, 1), (0, 1, 8), (1, 2, 9), *cube.faces[:3], *cube.faces[:2, ::-1]]
+    faces = np.vstack([cube.faces, extra])
+    mesh = clean(Triangles(vertices, faces, np.zeros(len(faces), int), ("part",)))
+    assert len(mesh.faces) == 12
+    assert_contract(mesh)
+
+
+def test_part_names_are_the_files_materials(tmp_path: Path):
+    text = cube_obj().splitlines()
+    half = len(text) - 6
+    lines = ["mtllib ../../nowhere.mtl", *text[:half], "usemtl Glass_01", *text[half:]]
+    (tmp_path / "model.obj").write_text("\n".join(lines))
+    mesh = load_source(mesh_sources(tmp_path)[0])
+    assert set(mesh.part_names) == {"oak", "Glass_01"}
+
+
+@pytest.mark.parametrize(
+    ("unit", "expected"), [(1.0, 3.0), (100.0, 3.0), (1000.0, 3.0), (1e-4, 0.5), (1e9, 0.5)]
+)
+def test_a_plausible_size_is_found_for_any_unit(tmp_path: Path, unit: float, expected: float):
+    (tmp_path / "model.obj").write_text(cube_obj(unit=unit))
+    mesh = load_source(f"file:{tmp_path}/model.obj")
+    assert np.ptp(mesh.vertices, axis=0).max() == pytest.approx(expected, rel=1e-4)
+
+
+def library(path: Path, entries: str, **members: str) -> Path:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr(CATALOGUE, entries)
+        for name, content in members.items():
+            archive.writestr(name.replace("__", "/") + ".obj", content)
+    return path
+
+
+def test_a_library_gives_sizes_turns_and_licences(tmp_path: Path):
+    path = library(
+        tmp_path / "some.sh3f",
+        "license=Public domain\n"
+        "model#1=/a/cube.obj\nwidth#1=40\ndepth#1=60\nheight#1=50\n"
+        "model#2=/cube\\ 2.obj\nwidth#2=40\ndepth#2=60\nheight#2=50\nmodelRotation#2=1 0 0 0 0 1 0 -1 0\n"
+        "license#2=Creative Commons Attribution 3.0\n"
+        "model#3=/missing.obj\nwidth#3=40\ndepth#3=60\nheight#3=50\n",
+        **{"a__cube": cube_obj(), "cube 2": cube_obj()},
+    )
+    survey = survey_meshes(str(tmp_path))
+    assert [s.name for s in survey.usable] == [f"file:{path}!a/cube.obj", f"file:{path}!cube 2.obj"]
+    for source in survey.usable:
+        np.testing.assert_allclose(source.size_m, (0.4, 0.6, 0.5), atol=1e-5)
+        assert_contract(load_source(source.name))
+    assert survey.skipped == ((f"file:{path}!missing.obj", "not in the archive"),)
+    assert mesh_sources(tmp_path, cc0_only=True) == (f"file:{path}!a/cube.obj",)
+
+
+def test_only_stated_public_domain_counts_as_cc0(tmp_path: Path):
+    for folder, licence in (("a", "CC0 1.0 Universal"), ("b", "CC BY 4.0"), ("c", None)):
+        (tmp_path / folder / "deep").mkdir(parents=True)
+        (tmp_path / folder / "deep" / "cube.obj").write_text(cube_obj())
+        if licence:
+            (tmp_path / folder / "LICENSE.txt").write_text(licence)
+    assert len(mesh_sources(tmp_path)) == 3
+    assert mesh_sources(tmp_path, cc0_only=True) == (f"file:{tmp_path}/a/deep/cube.obj",)
+    reasons = dict(survey_meshes(str(tmp_path), True).skipped)
+    assert reasons[f"file:{tmp_path}/b/deep/cube.obj"] == "licence 'CC BY 4.0' is not CC0"
+
+
+def test_the_cache_changes_nothing_and_follows_the_file(tmp_path: Path, own_cache: Path):
+    file = tmp_path / "model.obj"
+    file.write_text(cube_obj(material="glass"))
+    fresh = load_source(f"file:{file}")
+    assert len(list(own_cache.rglob("*.npz"))) == 1
+    again = load_source(f"file:{file}")
+    assert again.part_names == fresh.part_names == ("glass",)
+    for name in ("vertices", "normals", "faces", "face_parts"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(fresh, name))
+    for stored in own_cache.rglob("*.npz"):
+        stored.write_bytes(stored.read_bytes()[:100])
+    np.testing.assert_array_equal(load_source(f"file:{file}").vertices, fresh.vertices)
+    file.write_text(cube_obj(unit=0.1))
+    assert np.ptp(load_source(f"file:{file}").vertices, axis=0).max() == pytest.approx(0.3)
+
+
+def test_the_seed_plays_no_part(tmp_path: Path):
+    (tmp_path / "cube.obj").write_text(cube_obj())
+    (name,) = mesh_sources(tmp_path)
+    np.testing.assert_array_equal(build_mesh(name, 1).vertices, build_mesh(name, 2).vertices)
+
+
+@pytest.mark.parametrize("path", ["nowhere", "empty"])
+def test_nothing_usable_is_one_clear_line(tmp_path: Path, path: str):
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(FsidError, match=path):
+        mesh_sources(tmp_path / path)
+
+
+@pytest.mark.skipif(not FURNITURE.is_dir(), reason="needs the Debian package sweethome3d-furniture")
+def test_real_furniture_has_its_catalogue_size():
+    survey = survey_meshes(str(FURNITURE / "Reallusion.sh3f"))
+    assert len(survey.usable) == 25
+    assert not survey.skipped
+    female = survey.usable[0]
+    np.testing.assert_allclose(female.size_m, (0.466, 0.455, 1.655), rtol=1e-3)
+    assert "Attribution" in female.licence
+    for source in survey.usable[:5]:
+        assert_contract(load_source(source.name))
