@@ -6,9 +6,7 @@ from fsid.assets.maps import MaterialMaps
 from fsid.assets.material_registry import (
     MATERIAL_VARIANTS,
     bake_material,
-    material_colours,
     material_families,
-    material_layers,
     material_tile_m,
 )
 from fsid.assets.mesh import Mesh
@@ -24,19 +22,14 @@ __all__ = [
     "PART_KINDS",
     "MaterialMaps",
     "Mesh",
-    "TextureSurvey",
     "bake_material",
     "build_background",
     "build_mesh",
-    "material_colours",
     "material_families",
-    "material_layers",
     "material_tile_m",
     "mesh_families",
     "mesh_sources",
     "part_kind",
-    "survey_textures",
     "sweep_radius_m",
     "table_size_m",
-    "texture_sources",
 ]
