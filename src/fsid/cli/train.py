@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+import sys
 from pathlib import Path
 
 from rich.console import Console
@@ -22,14 +24,15 @@ def train(
 ) -> None:
     """Train NAFNet on the clean RAW of a dataset, with fresh noise at every draw, on a GPU or on the CPU.
 
-    Writes the settings (config.yaml), the loss history and the network (model.safetensors). Running the
-    same command again continues a training that was stopped.
+    Writes the settings (config.yaml), histories of loss and validation, the network that was best on scenes
+    held out of the training (model.safetensors) and the last one. Running the same command again continues
+    a training that was stopped. Several GPUs: torchrun --nproc-per-node N -m fsid train ...
 
     Args:
         data: Folder made by fsid generate.
         output: Folder of the run.
-        config: YAML file of settings, or the name of a built-in one: nafnet-tiny (CPU, minutes)
-            or nafnet-small (about 1 M parameters, GPU).
+        config: YAML file of settings, or the name of a built-in one: nafnet-tiny (CPU, minutes),
+            nafnet-small (1 M parameters, phone class; CPU, an hour or two), nafnet-32, nafnet-64 (GPU).
         set: Single settings, for example --set steps=20000 batch=16 learning_rate=1e-3.
         resume: Continue the training in the folder with the settings that it has there.
         quiet: No progress line.
@@ -40,6 +43,7 @@ def train(
     if resume and (config != Path("nafnet-tiny") or set):
         raise FsidError("--resume: takes the settings of the run; leave out --config and --set")
     settings = train_config(output / "config.yaml" if resume else config, set)
-    model = train_network(data, output, settings, resume=resume, quiet=quiet)
+    command = shlex.join(["fsid", *sys.argv[1:]])
+    model = train_network(data, output, settings, resume=resume, quiet=quiet, command=command)
     if not quiet:
         Console(stderr=True).print(f"model: {model}", soft_wrap=True)

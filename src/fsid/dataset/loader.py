@@ -51,7 +51,8 @@ class PatchConfig:
     """What a batch is made of.
 
     size_px: side of a patch in packed pixels (a 2 size_px square of the mosaic). profiles: cameras whose
-    noise is drawn, by name or file. iso_min, iso_max: log-uniform range.
+    noise is drawn, by name or file. iso_min, iso_max: log-uniform range. held_out: so many images at the end
+    of the dataset are not drawn; they are for validation.
     """
 
     size_px: int
@@ -59,6 +60,7 @@ class PatchConfig:
     profiles: tuple[str, ...]
     iso_min: float
     iso_max: float
+    held_out: int = 0
 
 
 class PatchDataset(Dataset[Batch]):
@@ -70,7 +72,10 @@ class PatchDataset(Dataset[Batch]):
     def __init__(self, data_dir: Path, config: PatchConfig, seed: int, rank: int = 0) -> None:
         if not config.profiles:
             raise FsidError("profiles: name at least one camera profile to draw noise from")
-        self._mosaics = index_mosaics(data_dir)
+        found = index_mosaics(data_dir)
+        if not 0 <= config.held_out < len(found):
+            raise FsidError(f"{data_dir}: has {len(found)} images; held_out {config.held_out} leaves none")
+        self._mosaics = found[: len(found) - config.held_out]
         self._profiles = [load_profile(name) for name in config.profiles]
         self._config, self._seed, self._rank = config, seed, rank
         self._maps: dict[Path, np.memmap] = {}

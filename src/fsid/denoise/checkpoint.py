@@ -1,6 +1,6 @@
 """The state of a training between two steps, in one safetensors file: kill it whenever you like.
 
-    checkpoint = {weight.*, average.*, exp_avg.*, exp_avg_sq.*} + header {step, history}
+    checkpoint = {weight.*, average.*, exp_avg.*, exp_avg_sq.*} + header {step, history, validation}
 
 One file and one rename: weights and optimizer can never be of different steps. Tensors are copied into those
 of the live network and optimizer, which keeps their memory layout and so the order of every later sum.
@@ -28,12 +28,14 @@ class TrainState:
     """What changes from step to step beside weights and optimizer.
 
     step: steps done. average: exponential moving average of the weights. history: one row {step, loss, psnr,
-    learning_rate} per `log_every` steps, means since the row before. pending: sums towards the next row.
+    learning_rate} per `log_every` steps, means since the row before. validation: one row {step, psnr_scenes,
+    ...} per `validate_every` steps. pending: sums towards the next row.
     """
 
     step: int
     average: dict[str, Tensor]
     history: list[dict[str, float]] = field(default_factory=list)
+    validation: list[dict[str, float]] = field(default_factory=list)
     pending: list[tuple[float, float]] = field(default_factory=list)
 
     @classmethod
@@ -46,20 +48,19 @@ class TrainState:
         """Count a step and move the average with min(decay, (1 + t) / (10 + t)): it forgets its start."""
         decay = min(decay, (1 + self.step) / (10 + self.step))
         weights = net.state_dict()
-        for name, mean in self.average.items():
-            mean.lerp_(weights[name], 1 - decay)
+        torch._foreach_lerp_(list(self.average.values()), [weights[n] for n in self.average], 1 - decay)
         self.step += 1
 
-    def log(self, loss: float, psnr: float, rate: float, every: int) -> None:
-        """Take in the figures of the step just done."""
+    def log(self, loss: float, psnr: float, rate: float, every: int) -> dict[str, float] | None:
+        """Take in the figures of the step just done; the row of the history that it completes, if any."""
         self.pending.append((loss, psnr))
-        if self.step % every == 0:
-            losses, psnrs = zip(*self.pending, strict=True)
-            mean_loss, mean_psnr = sum(losses) / len(losses), sum(psnrs) / len(psnrs)
-            self.history.append(
-                {"step": self.step, "loss": mean_loss, "psnr": mean_psnr, "learning_rate": rate}
-            )
-            self.pending.clear()
+        if self.step % every:
+            return None
+        losses, psnrs = zip(*self.pending, strict=True)
+        mean_loss, mean_psnr = sum(losses) / len(losses), sum(psnrs) / len(psnrs)
+        self.history.append({"step": self.step, "loss": mean_loss, "psnr": mean_psnr, "learning_rate": rate})
+        self.pending.clear()
+        return self.history[-1]
 
 
 def save_checkpoint(
@@ -71,7 +72,12 @@ def save_checkpoint(
     for name, parameter in net.named_parameters():
         for moment in _MOMENTS:
             tensors[f"{moment}.{name}"] = optimizer.state[parameter][moment]
-    progress = {"step": state.step, "history": state.history, "pending": state.pending}
+    progress = {
+        "step": state.step,
+        "history": state.history,
+        "validation": state.validation,
+        "pending": state.pending,
+    }
     write_tensors(run_dir / CHECKPOINT_FILE, tensors, {"progress": json.dumps(progress)})
 
 
@@ -84,7 +90,11 @@ def load_checkpoint(run_dir: Path, net: nn.Module, optimizer: torch.optim.Optimi
     try:
         progress = json.loads(header["progress"])
         state = TrainState(
-            progress["step"], {}, progress["history"], [(a, b) for a, b in progress["pending"]]
+            progress["step"],
+            {},
+            progress["history"],
+            progress["validation"],
+            [(a, b) for a, b in progress["pending"]],
         )
     except (KeyError, ValueError, TypeError):
         raise FsidError(f"{path}: has no training progress in its header; delete it to start again") from None

@@ -14,20 +14,21 @@ _SMOOTHING = 0.05  # of the shown loss and PSNR, which jump from batch to batch
 class LiveLine:
     """Context manager; nothing is shown where `quiet`."""
 
-    def __init__(self, config: TrainConfig, step: int, *, quiet: bool) -> None:
+    def __init__(self, config: TrainConfig, step: int, processes: int, *, quiet: bool) -> None:
         columns = (
             TextColumn("train"),
             BarColumn(bar_width=20),
             MofNCompleteColumn(),
             TextColumn("loss {task.fields[loss]:.3f}  PSNR {task.fields[psnr]:.2f} dB"),
+            TextColumn("{task.fields[held_out]}"),
             TextColumn("{task.fields[rate]}"),
             TimeRemainingColumn(),
         )
         self._progress = Progress(*columns, disable=quiet)
         self._task = self._progress.add_task(
-            "train", total=config.steps, completed=step, loss=0.0, psnr=0.0, rate=""
+            "train", total=config.steps, completed=step, loss=0.0, psnr=0.0, rate="", held_out=""
         )
-        self._batch = config.batch
+        self._batch = config.batch * processes
         self._shown: tuple[float, float] | None = None
 
     def __enter__(self) -> LiveLine:
@@ -47,3 +48,7 @@ class LiveLine:
         speed = self._progress.tasks[0].speed
         rate = f"{speed * self._batch:.0f} patches/s" if speed else ""
         self._progress.update(self._task, completed=step, loss=loss, psnr=psnr, rate=rate)
+
+    def validated(self, psnr: float) -> None:
+        """PSNR in dB on the held-out scenes."""
+        self._progress.update(self._task, held_out=f"held out {psnr:.2f} dB")

@@ -50,11 +50,17 @@ class Denoiser:
     device: torch.device
 
 
-def save_model(path: Path, weights: Mapping[str, Tensor], card: ModelCard) -> None:
-    """Write `path` (.safetensors) and the card beside it (.json), each atomically."""
-    plain = json.dumps(to_plain(card), indent=1)
-    write_tensors(path, weights, {_CARD: plain})
-    write_atomically(path.with_suffix(".json"), plain.encode())
+def save_model(
+    path: Path, weights: Mapping[str, Tensor], card: ModelCard, circumstances: Mapping[str, Any] | None = None
+) -> None:
+    """Write `path` (.safetensors) and the card beside it (.json), each atomically.
+
+    circumstances: for the readable copy alone, for example when and on what the network was trained.
+    """
+    plain = to_plain(card)
+    write_tensors(path, weights, {_CARD: json.dumps(plain, indent=1)})
+    readable = json.dumps(plain | dict(circumstances or {}), indent=1)
+    write_atomically(path.with_suffix(".json"), readable.encode())
 
 
 def load_model(run_or_file: str | Path, device: str | torch.device = "cpu") -> Denoiser:

@@ -7,9 +7,9 @@ the noise that is left, 1 for the untrained network. So dark and bright, quiet a
 a plain mean of squares over ISO 400..8000 would hear the brightest and noisiest alone.
 
 **Resume.** Batch `step` depends on (seed, step) and everything else that a step needs is in one checkpoint
-file: weights, their moving average, both moments of AdamW, the loss history. It is replaced atomically, so a
-run killed at any moment goes on from its last checkpoint, and on a CPU it ends with the same bits as an
-undisturbed one.
+file: weights, their moving average, both moments of AdamW, histories of loss and validation. It is replaced
+atomically, so a run killed at any moment goes on from its last checkpoint, and on a CPU it ends with the same
+bits as an undisturbed one.
 """
 
 from __future__ import annotations
@@ -25,19 +25,24 @@ from accelerate import Accelerator
 from torch import Tensor
 from torch.utils.data import DataLoader
 
-from fsid.config import load_settings, save_settings, to_plain
+from fsid.config import load_settings, read_yaml, save_settings, to_plain
 from fsid.dataset.loader import Batch, PatchConfig, PatchDataset
+from fsid.denoise.board import Board
 from fsid.denoise.checkpoint import TrainState, load_checkpoint, save_checkpoint
 from fsid.denoise.live import LiveLine
 from fsid.denoise.model import MODEL_FILE, ModelCard, save_model
 from fsid.denoise.raw_denoiser import RawDenoiser
+from fsid.denoise.sessions import Session, read_sessions
 from fsid.denoise.stabilise import stabilise
 from fsid.denoise.train_config import TrainConfig
+from fsid.denoise.validate import held_out, validation
 from fsid.errors import FsidError
 from fsid.files import write_atomically
 
 CONFIG_FILE = "config.yaml"
-HISTORY_FILE = "history.json"
+HISTORY_FILE, VALIDATION_FILE = "history.json", "validation.json"
+LAST_FILE = "last.safetensors"  # beside the best network, `MODEL_FILE`
+SELECTED = "psnr_scenes"  # which validation chooses the best network
 
 
 def train(
@@ -47,43 +52,130 @@ def train(
     *,
     resume: bool = False,
     quiet: bool = False,
+    command: str = "",
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
-    """Train on `data_dir`'s shards; config, checkpoint, history, model go to `run_dir`. Path of the model.
+    """Train on `data_dir`'s shards; config, checkpoint, history, models go to `run_dir`. Path of the best.
 
     A run that is in `run_dir` already goes on from its checkpoint; it must have been started with the same
-    config. resume: insist that there is one. progress(done, steps) is called in place of the live line.
-    Raises FsidError for unusable data or settings, another run in `run_dir`, or a training that diverges.
+    config. resume: insist that there is one. command: for the record of the run. progress(done, steps) is
+    called in place of the live line. Under `torchrun` or `accelerate launch` each process draws batches of
+    its own and gradients are averaged. Raises FsidError for unusable data or settings, another run in
+    `run_dir`, or a training that diverges.
     """
     if config.threads:
         torch.set_num_threads(config.threads)
     accelerator = Accelerator(mixed_precision="bf16" if torch.cuda.is_available() else "no")
-    patches = PatchDataset(data_dir, _patch_config(config), config.seed, accelerator.process_index)
-    _prepare_run(run_dir, config, resume)
+    is_main = accelerator.is_main_process
+    kept = held_out(data_dir, config)
+    patches = PatchDataset(data_dir, _patch_config(config, len(kept)), config.seed, accelerator.process_index)
+    with accelerator.main_process_first():
+        _prepare_run(run_dir, config, resume and is_main)
     torch.manual_seed(config.seed)
     net, optimizer = _prepare(accelerator, config)
     bare = accelerator.unwrap_model(net)
     state = load_checkpoint(run_dir, bare, optimizer)
+    forward = torch.compile(net) if _compiles(config) else net
     loader = DataLoader(
-        patches, batch_size=None, sampler=range(state.step, config.steps), num_workers=config.loader_processes
+        patches,
+        batch_size=None,
+        sampler=range(state.step, config.steps),
+        num_workers=config.loader_processes,
+        pin_memory=torch.cuda.is_available(),
     )
-    is_main = accelerator.is_main_process
-    with LiveLine(config, state.step, quiet=quiet or progress is not None or not is_main) as live:
+    shown = is_main and not quiet and progress is None
+    with LiveLine(config, state.step, accelerator.num_processes, quiet=not shown) as live:
+        keeper = _Keeper(data_dir, run_dir, config, accelerator, patches.mosaics, command, state, live)
         for batch in loader:
             rate = learning_rate(config, state.step)
-            loss, psnr = _step(accelerator, net, optimizer, batch, rate, config)
+            loss, psnr = _step(accelerator, forward, net, optimizer, batch, rate, config)
             state.advance(bare, config.ema_decay)
-            state.log(loss, psnr, rate, config.log_every)
             live.update(state.step, loss, psnr)
+            row = state.log(loss, psnr, rate, config.log_every)
+            if is_main:
+                keeper.after_step(row, bare, optimizer)
             if progress is not None:
                 progress(state.step, config.steps)
-            if is_main and state.step % config.checkpoint_every == 0:
-                _save(run_dir, state, bare, optimizer)
-    if is_main:
-        _save(run_dir, state, bare, optimizer)
-        card = _card(config, state, f"{patches.mosaics} images of {data_dir.resolve().name}")
-        save_model(run_dir / MODEL_FILE, state.average, card)
+        if is_main:
+            keeper.finish(bare, optimizer)
+    accelerator.wait_for_everyone()
     return run_dir / MODEL_FILE
+
+
+class _Keeper:
+    """Writes what a run leaves behind: checkpoints, logs, validation, the best and the last network."""
+
+    def __init__(
+        self,
+        data_dir: Path,
+        run_dir: Path,
+        config: TrainConfig,
+        accelerator: Accelerator,
+        images: int,
+        command: str,
+        state: TrainState,
+        live: LiveLine,
+    ) -> None:
+        main = accelerator.is_main_process
+        self._run_dir, self._config, self._state, self._live = run_dir, config, state, live
+        self._validation = validation(held_out(data_dir, config) if main else (), config, accelerator.device)
+        self._training = f"{images} images of {data_dir.resolve().name}"
+        self._data = read_yaml(data_dir / CONFIG_FILE) if (data_dir / CONFIG_FILE).is_file() else {}
+        self._session = Session(run_dir, command, state.step, accelerator.num_processes)
+        self._board = Board(run_dir, state.step, wanted=config.tensorboard and main)
+
+    def after_step(
+        self, row: dict[str, float] | None, net: torch.nn.Module, optimizer: torch.optim.Optimizer
+    ) -> None:
+        """What is due after the step just done; row: of the history, where one was finished."""
+        config, step = self._config, self._state.step
+        if row is not None:
+            self._board.write(step, {f"train/{name}": row[name] for name in row if name != "step"})
+        if self._validation and (step % config.validate_every == 0 or step == config.steps):
+            self._validate()
+        if step % config.checkpoint_every == 0:
+            self._save(net, optimizer)
+
+    def finish(self, net: torch.nn.Module, optimizer: torch.optim.Optimizer) -> None:
+        """The last checkpoint and network; the best one is the last where nothing was validated."""
+        self._save(net, optimizer)
+        self._model(LAST_FILE)
+        if not self._validation or not (self._run_dir / MODEL_FILE).is_file():
+            self._model(MODEL_FILE)
+        self._board.close()
+
+    def _validate(self) -> None:
+        state = self._state
+        figures = self._validation.measure(state.average)
+        best = max((row[SELECTED] for row in state.validation if SELECTED in row), default=-np.inf)
+        state.validation.append({"step": state.step, **figures})
+        self._board.write(state.step, {f"validation/{name}": value for name, value in figures.items()})
+        if figures.get(SELECTED, np.inf) > best:
+            self._session.save(state.step)
+            self._model(MODEL_FILE)
+        if SELECTED in figures:
+            self._live.validated(figures[SELECTED])
+
+    def _save(self, net: torch.nn.Module, optimizer: torch.optim.Optimizer) -> None:
+        state = self._state
+        save_checkpoint(self._run_dir, state, net, optimizer)
+        for file, rows in ((HISTORY_FILE, state.history), (VALIDATION_FILE, state.validation)):
+            write_atomically(self._run_dir / file, json.dumps(rows, indent=0).encode())
+        self._session.save(state.step)
+
+    def _model(self, name: str) -> None:
+        state, config = self._state, self._config
+        details = {
+            "config": to_plain(config),
+            "data": self._data,
+            "step": state.step,
+            "torch": torch.__version__,
+            "last": state.history[-1:],
+            "validation": state.validation[-1:],
+        }
+        card = ModelCard(config.network, config.patch_px, self._training, details)
+        sessions = {"sessions": read_sessions(self._run_dir)}
+        save_model(self._run_dir / name, state.average, card, sessions)
 
 
 def load_history(run_dir: Path) -> tuple[list[int], list[float], list[float]]:
@@ -139,26 +231,36 @@ def _prepare_run(run_dir: Path, config: TrainConfig, resume: bool) -> None:
             raise FsidError(f"{run_dir}: cannot be written ({error.strerror})") from None
 
 
-def _patch_config(config: TrainConfig) -> PatchConfig:
+def _patch_config(config: TrainConfig, held_out_images: int) -> PatchConfig:
     return PatchConfig(
         size_px=config.patch_px,
         batch=config.batch,
         profiles=config.profiles,
         iso_min=config.iso_min,
         iso_max=config.iso_max,
+        held_out=held_out_images,
     )
+
+
+def _compiles(config: TrainConfig) -> bool:
+    return config.compile == "on" or (config.compile == "auto" and torch.cuda.is_available())
 
 
 def _prepare(accelerator: Accelerator, config: TrainConfig) -> tuple[torch.nn.Module, torch.optim.Optimizer]:
     net = RawDenoiser(config.network)
     optimizer = torch.optim.AdamW(
-        net.parameters(), lr=config.learning_rate, betas=config.betas, weight_decay=config.weight_decay
+        net.parameters(),
+        lr=config.learning_rate,
+        betas=config.betas,
+        weight_decay=config.weight_decay,
+        fused=True,
     )
     return accelerator.prepare(net, optimizer)
 
 
 def _step(
     accelerator: Accelerator,
+    forward: Callable[..., Tensor],
     net: torch.nn.Module,
     optimizer: torch.optim.Optimizer,
     batch: Batch,
@@ -172,7 +274,7 @@ def _step(
     for group in optimizer.param_groups:
         group["lr"] = rate
     optimizer.zero_grad()
-    estimate = net(noisy, k, sigma2).float()
+    estimate = forward(noisy, k, sigma2).float()
     loss = noise_left(estimate, clean, k, sigma2)
     accelerator.backward(loss)
     accelerator.clip_grad_norm_(net.parameters(), config.clip_norm)
@@ -181,13 +283,3 @@ def _step(
     if not np.isfinite(value):
         raise FsidError("the loss is not finite: the training diverged; lower learning_rate and start again")
     return value, mean_psnr(estimate.detach(), clean).item()
-
-
-def _save(run_dir: Path, state: TrainState, net: torch.nn.Module, optimizer: torch.optim.Optimizer) -> None:
-    save_checkpoint(run_dir, state, net, optimizer)
-    write_atomically(run_dir / HISTORY_FILE, json.dumps(state.history, indent=0).encode())
-
-
-def _card(config: TrainConfig, state: TrainState, training: str) -> ModelCard:
-    details = {"config": to_plain(config), "torch": torch.__version__, "last": state.history[-1:]}
-    return ModelCard(config.network, config.patch_px, training, details)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from importlib.resources import as_file, files
 from pathlib import Path
+from typing import Literal
 
 from fsid.config import load_settings
 from fsid.denoise.raw_denoiser import NetworkConfig
@@ -20,9 +21,12 @@ class TrainConfig:
     of a patch in packed pixels (the mosaic patch has twice that). learning_rate: peak; final_rate: end of the
     cosine as a share of it. warmup_steps: linear rise. betas, weight_decay: of AdamW. clip_norm: largest
     gradient norm. ema_decay: of the moving average of the weights, which is the model that is kept. profiles:
-    cameras whose noise is drawn, by name or file. iso_min, iso_max: log-uniform range. seed: of weights,
-    patches and noise. log_every, checkpoint_every: steps. threads: of PyTorch on a CPU, 0 leaves its own
-    choice. loader_processes: extra processes that prepare batches (0: none, right on a CPU).
+    cameras whose noise is drawn, by name or file. iso_min, iso_max: log-uniform range. held_out: images at
+    the end of the dataset that are for validation, at most a fifth of it. validate_every: steps.
+    validation_photos: a folder of photographs to validate on as well ("" for none). seed: of weights,
+    patches and noise. log_every, checkpoint_every: steps. tensorboard: write its logs, where it is installed.
+    compile: the network with torch.compile; auto does on a GPU. threads: of PyTorch on a CPU, 0 leaves its
+    own choice. loader_processes: extra processes that prepare batches (0: none, right on a CPU).
     """
 
     network: NetworkConfig = field(default_factory=NetworkConfig)
@@ -39,20 +43,25 @@ class TrainConfig:
     profiles: tuple[str, ...] = ("pixel6", "galaxy-s22")
     iso_min: float = 400.0
     iso_max: float = 8000.0
+    held_out: int = 8
+    validate_every: int = 1000
+    validation_photos: str = ""
     seed: int = 0
     log_every: int = 20
     checkpoint_every: int = 500
+    tensorboard: bool = True
+    compile: Literal["auto", "on", "off"] = "auto"
     threads: int = 0
     loader_processes: int = 0
 
     def __post_init__(self) -> None:
-        for key in ("steps", "batch", "patch_px", "log_every", "checkpoint_every"):
+        for key in ("steps", "batch", "patch_px", "log_every", "checkpoint_every", "validate_every"):
             if getattr(self, key) < 1:
                 raise FsidError(f"{key}: must be at least 1, got {getattr(self, key)}")
         for key in ("learning_rate", "clip_norm"):
             if not getattr(self, key) > 0:
                 raise FsidError(f"{key}: must be above 0, got {getattr(self, key)}")
-        for key in ("warmup_steps", "weight_decay", "threads", "loader_processes", "seed"):
+        for key in ("warmup_steps", "weight_decay", "threads", "loader_processes", "seed", "held_out"):
             if getattr(self, key) < 0:
                 raise FsidError(f"{key}: must not be negative, got {getattr(self, key)}")
         if not 0 <= self.ema_decay < 1:

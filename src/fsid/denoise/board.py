@@ -1,0 +1,36 @@
+"""TensorBoard logs of a run, where `tensorboard` is installed; `history.json` holds the same figures.
+
+A run that goes on from a checkpoint purges what the lost steps had logged.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+BOARD_FOLDER = "tensorboard"
+
+
+class Board:
+    """Writes scalars into RUN/tensorboard, or nothing where `wanted` is False or there is no tensorboard."""
+
+    def __init__(self, run_dir: Path, step: int, *, wanted: bool) -> None:
+        self._writer: Any = None
+        if wanted:
+            try:
+                from torch.utils.tensorboard import SummaryWriter
+            except ImportError:
+                return
+            self._writer = SummaryWriter(str(run_dir / BOARD_FOLDER), purge_step=step or None)
+
+    def write(self, step: int, figures: Mapping[str, float]) -> None:
+        """One point per figure at `step`."""
+        if self._writer is not None:
+            for name, value in figures.items():
+                self._writer.add_scalar(name, value, step)
+
+    def close(self) -> None:
+        """Flush and end."""
+        if self._writer is not None:
+            self._writer.close()
