@@ -3,6 +3,7 @@
     box       rounded box: Minkowski sum of a box and a sphere, p = core + r n, so normals are exact
     lathe     surface of revolution of a profile (r, z), split into hard edges where it turns sharply
     sweep     circular tube along a path in a rotation-minimising frame
+    tubes     many of them at once
     sheet     a grid of points given a thickness, so that both sides carry their own normals
     ball      icosphere pushed along its directions
 
@@ -12,7 +13,7 @@ denoiser) where an edge is. A `Solid` is placed by chaining `.turned().stretched
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
@@ -51,10 +52,23 @@ class Solid:
         turn = rotation_matrix(x_deg, y_deg, z_deg).T
         return Solid(self.vertices @ turn, self.normals @ turn, self.faces)
 
+    def resting(self, z: float = 0.0) -> Solid:
+        """Moved up or down until its lowest vertex is at height `z`."""
+        return self.at(z=z - float(self.vertices[:, 2].min()))
+
     def stretched(self, x: float, y: float, z: float) -> Solid:
         """Scaled per axis by positive factors; normals by the inverse transpose."""
         normals = self.normals / (x, y, z)
         return Solid(self.vertices * (x, y, z), normals / _length(normals), self.faces)
+
+    def warped(self, warp: Callable[[np.ndarray], np.ndarray]) -> Solid:
+        """Bent by a smooth map (V, 3) -> (V, 3) that keeps orientation; normals by the cofactors of its
+        Jacobian (central differences), so smooth stays smooth and hard edges stay hard."""
+        step = 1e-5
+        a, b, c = ((warp(self.vertices + e) - warp(self.vertices - e)) for e in step * np.eye(3))
+        x, y, z = self.normals.T[:, :, None]
+        normals = x * np.cross(b, c) + y * np.cross(c, a) + z * np.cross(a, b)
+        return Solid(warp(self.vertices), normals / np.maximum(_length(normals), 1e-30), self.faces)
 
 
 def join(solids: Sequence[Solid]) -> Solid:
@@ -121,30 +135,42 @@ def cone(bottom: float, top: float, height: float, bevel: float = 0.003, segment
 
 def sweep(path: np.ndarray, radius: float | np.ndarray, segments: int = 12, *, closed: bool = False) -> Solid:
     """Tube of `radius` (scalar or one per point, metres) along `path` (n, 3); open ends get round caps."""
-    radii = np.broadcast_to(np.asarray(radius, dtype=float), (len(path),))
+    return tubes(np.asarray(path, dtype=float)[None], radius, segments, closed=closed)
+
+
+def tubes(
+    paths: np.ndarray, radius: float | np.ndarray, segments: int = 12, *, closed: bool = False
+) -> Solid:
+    """`sweep` along many `paths` (k, n, 3) at once; `radius` broadcasts to (k, n)."""
+    radii = np.broadcast_to(np.asarray(radius, dtype=float), paths.shape[:2])
     if not closed:
-        path, radii = _with_caps(path, radii)
-    tangents = _tangents(path, closed)
-    normals, binormals = _frames(tangents, closed)
+        paths, radii = _with_caps(paths, radii)
+    normals, binormals = _frames(_tangents(paths, closed), closed)
     angle = np.linspace(0, 2 * np.pi, segments, endpoint=False)[:, None]
-    ring = normals[:, None] * np.cos(angle) + binormals[:, None] * np.sin(angle)
-    points = path[:, None] + ring * radii[:, None, None]
-    faces = _grid_faces(len(path), segments, wrap_rows=closed, wrap_cols=True)
+    ring = normals[:, :, None] * np.cos(angle) + binormals[:, :, None] * np.sin(angle)
+    points = paths[:, :, None] + ring * radii[:, :, None, None]
+    faces = _repeated(_grid_faces(paths.shape[1], segments, wrap_rows=closed, wrap_cols=True), points)
     vertices = points.reshape(-1, 3)
     return Solid(vertices, smooth_normals(vertices, faces), faces)
 
 
 def sheet(points: np.ndarray, thickness: float) -> Solid:
     """Thick sheet over a grid `points` (n, m, 3): two sides and a rim; the top faces d_cols x d_rows."""
-    rows, cols = points.shape[:2]
-    faces = _grid_faces(rows, cols)
+    return sheets(points[None], thickness)
+
+
+def sheets(points: np.ndarray, thickness: float) -> Solid:
+    """`sheet` over many grids `points` (k, n, m, 3) at once."""
+    count, rows, cols = points.shape[:3]
+    faces = _repeated(_grid_faces(rows, cols), points)
     middle = points.reshape(-1, 3)
     normals = smooth_normals(middle, faces)
     lift = normals * thickness / 2
     index = np.arange(rows * cols).reshape(rows, cols)
     loop = np.r_[index[0, :-1], index[:-1, -1], index[-1, :0:-1], index[:0:-1, 0]]
+    loops = np.arange(count)[:, None] * rows * cols + loop
     top, bottom = middle + lift, middle - lift
-    rim = _rim(bottom[loop], top[loop], normals[loop])
+    rim = _rim(bottom[loops], top[loops], normals[loops])
     return join([Solid(top, normals, faces), Solid(bottom, -normals, faces[:, ::-1]), rim])
 
 
@@ -210,35 +236,46 @@ def _revolved(points: np.ndarray, heading: np.ndarray, segments: int) -> Solid:
     return Solid(vertices.reshape(-1, 3), normals.reshape(-1, 3), faces)
 
 
-def _with_caps(path: np.ndarray, radii: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _repeated(faces: np.ndarray, groups: np.ndarray) -> np.ndarray:
+    """The faces of one group of vertices, for each of `groups` (k, ..., 3) laid end to end."""
+    size = int(np.prod(groups.shape[1:-1]))
+    return (faces + np.arange(len(groups))[:, None, None] * size).reshape(-1, 3)
+
+
+def _with_caps(paths: np.ndarray, radii: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Extend both ends by a quarter circle that closes to (nearly) a point."""
-    turn = np.linspace(0, np.pi / 2, 4)[1:]
+    turn = np.linspace(0, np.pi / 2, 4)[1:, None]
     ends = []
-    for end, inner, radius in ((path[0], path[1], radii[0]), (path[-1], path[-2], radii[-1])):
-        outward = (end - inner) / np.linalg.norm(end - inner)
-        ends.append((end + np.sin(turn)[:, None] * outward * radius, np.maximum(np.cos(turn), 1e-3) * radius))
+    for end, inner, radius in ((0, 1, radii[:, :1]), (-1, -2, radii[:, -1:])):
+        outward = paths[:, end] - paths[:, inner]
+        outward = (outward / _length(outward) * radius)[:, None]
+        ends.append((paths[:, [end]] + np.sin(turn) * outward, radius * np.maximum(np.cos(turn[:, 0]), 1e-3)))
     (head, head_r), (tail, tail_r) = ends
-    return np.vstack([head[::-1], path, tail]), np.r_[head_r[::-1], radii, tail_r]
+    return np.hstack([head[:, ::-1], paths, tail]), np.hstack([head_r[:, ::-1], radii, tail_r])
 
 
-def _tangents(path: np.ndarray, closed: bool) -> np.ndarray:
-    step = np.roll(path, -1, axis=0) - np.roll(path, 1, axis=0) if closed else np.gradient(path, axis=0)
+def _tangents(paths: np.ndarray, closed: bool) -> np.ndarray:
+    around = np.roll(paths, -1, axis=1) - np.roll(paths, 1, axis=1)
+    step = around if closed else np.gradient(paths, axis=1)
     return step / _length(step)
 
 
 def _frames(tangents: np.ndarray, closed: bool) -> tuple[np.ndarray, np.ndarray]:
     """Rotation-minimising normals and binormals; a closed path spreads the leftover twist evenly."""
-    normal = np.cross(tangents[0], np.eye(3)[np.abs(tangents[0]).argmin()])
-    normals = [normal / np.linalg.norm(normal)]
-    steps = [*tangents[1:], tangents[0]] if closed else tangents[1:]
-    for tangent in steps:
-        moved = normals[-1] - tangent * (normals[-1] @ tangent)
-        normals.append(moved / np.sqrt(moved @ moved))
-    frame = np.array(normals[: len(tangents)])
+    first = tangents[:, 0]
+    normal = np.cross(first, np.eye(3)[np.abs(first).argmin(1)])
+    normals = [normal / _length(normal)]
+    for k in [*range(1, tangents.shape[1]), *([0] if closed else [])]:
+        tangent, normal = tangents[:, k], normals[-1]
+        normals.append(normal - tangent * (tangent * normal).sum(1, keepdims=True))
+    transported = np.stack(normals, axis=1)
+    transported /= _length(transported)
+    frame = transported[:, : tangents.shape[1]]
     other = np.cross(tangents, frame)
     if closed:
-        leftover = np.arctan2(normals[-1] @ other[0], normals[-1] @ frame[0])
-        angle = -leftover * np.arange(len(tangents))[:, None] / len(tangents)
+        last = transported[:, -1]
+        leftover = np.arctan2((last * other[:, 0]).sum(1), (last * frame[:, 0]).sum(1))
+        angle = (-leftover[:, None] * np.arange(tangents.shape[1]) / tangents.shape[1])[..., None]
         frame, other = (
             frame * np.cos(angle) + other * np.sin(angle),
             other * np.cos(angle) - frame * np.sin(angle),
@@ -247,13 +284,13 @@ def _frames(tangents: np.ndarray, closed: bool) -> tuple[np.ndarray, np.ndarray]
 
 
 def _rim(bottom: np.ndarray, top: np.ndarray, normals: np.ndarray) -> Solid:
-    """The strip that closes a sheet, flat per edge; `bottom` and `top` run once around its border."""
-    after = np.roll(np.arange(len(bottom)), -1)
-    outward = np.cross(bottom[after] - bottom, normals + normals[after])
+    """The strips that close sheets, flat per edge; `bottom` and `top` (k, n, 3) run once around each."""
+    bottom_after, top_after = np.roll(bottom, -1, axis=1), np.roll(top, -1, axis=1)
+    outward = np.cross(bottom_after - bottom, normals + np.roll(normals, -1, axis=1))
     outward /= np.maximum(_length(outward), 1e-30)
-    corners = np.stack([bottom, bottom[after], top[after], top], axis=1)
-    quads = 4 * np.arange(len(bottom))[:, None, None] + np.array([(0, 1, 2), (0, 2, 3)])
-    return Solid(corners.reshape(-1, 3), np.repeat(outward, 4, axis=0), quads.reshape(-1, 3))
+    corners = np.stack([bottom, bottom_after, top_after, top], axis=2).reshape(-1, 3)
+    quads = np.arange(0, len(corners), 4)[:, None, None] + np.array([(0, 1, 2), (0, 2, 3)])
+    return Solid(corners, np.repeat(outward.reshape(-1, 3), 4, axis=0), quads.reshape(-1, 3))
 
 
 @lru_cache(maxsize=8)
