@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
-from fsid.assets import MATERIAL_VARIANTS, bake_material, material_families, material_tile_m
+from fsid.assets import (
+    MATERIAL_VARIANTS,
+    bake_material,
+    material_colours,
+    material_families,
+    material_layers,
+    material_tile_m,
+)
 from fsid.assets.patterns import cells, level, noise, shade, stack, warp
 from fsid.errors import FsidError
 
@@ -58,6 +65,29 @@ class TestEveryFamily:
         )
 
 
+@pytest.mark.parametrize("layer", material_layers())
+def test_a_layer_changes_a_material_and_stays_tileable(layer):
+    for variant in range(MATERIAL_VARIANTS):
+        below = bake_material("brick", variant, SIZE)
+        maps = bake_material(f"brick+{layer}", variant, SIZE)
+        assert maps.tile_m == below.tile_m
+        assert any(not np.array_equal(getattr(maps, name), getattr(below, name)) for name in MAPS)
+        for name in MAPS:
+            field = getattr(maps, name)
+            assert field.dtype == np.float32
+            assert 0 <= field.min() <= field.max() <= 1, name
+            for image in (field, field.T):
+                steps = np.abs(np.roll(image, -1, axis=0) - image).mean(1)
+                assert steps[-1] <= 1.3 * steps[:-1].max() + 1e-4, (variant, name)
+
+
+def test_layers_lie_over_each_other():
+    both = bake_material("tiles+dirt+dust", 0, 64)
+    assert not np.array_equal(both.detail, bake_material("tiles+dirt", 0, 64).detail)
+    assert material_tile_m("tiles+dirt+dust") == material_tile_m("tiles")
+    assert material_colours("tiles+dirt+dust", 0) == material_colours("tiles", 0)
+
+
 def test_most_families_carry_detail_at_the_texel(baked):
     """RMS difference of neighbouring texels of a typical albedo, relative to its mean."""
     strengths = []
@@ -73,6 +103,8 @@ def test_most_families_carry_detail_at_the_texel(baked):
     ("family", "variant", "size", "message"),
     [
         ("velvet", 0, 256, "'velvet'"),
+        ("velvet+dust", 0, 256, "'velvet'"),
+        ("brick+glitter", 0, 256, r"'brick\+glitter'"),
         ("brick", 4, 256, "variant 4"),
         ("brick", -1, 256, "variant -1"),
         ("brick", 0, 300, "size 300"),

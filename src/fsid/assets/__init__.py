@@ -6,7 +6,9 @@ from fsid.assets.maps import MaterialMaps
 from fsid.assets.material_registry import (
     MATERIAL_VARIANTS,
     bake_material,
+    material_colours,
     material_families,
+    material_layers,
     material_tile_m,
 )
 from fsid.assets.mesh import Mesh
@@ -15,6 +17,7 @@ from fsid.assets.registry import (
     mesh_families,
 )
 from fsid.assets.sources import mesh_sources
+from fsid.assets.textures import TextureSurvey, survey_textures, texture_sources
 
 __all__ = [
     "BACKGROUND_PARTS",
@@ -22,14 +25,19 @@ __all__ = [
     "PART_KINDS",
     "MaterialMaps",
     "Mesh",
+    "TextureSurvey",
     "bake_material",
     "build_background",
     "build_mesh",
+    "material_colours",
     "material_families",
+    "material_layers",
     "material_tile_m",
     "mesh_families",
     "mesh_sources",
     "part_kind",
+    "survey_textures",
     "sweep_radius_m",
     "table_size_m",
+    "texture_sources",
 ]

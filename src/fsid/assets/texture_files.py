@@ -1,0 +1,141 @@
+"""Texture sets on disk: which files belong together, and one bounded image of them.
+
+    ambientCG    Bricks001_1K-JPG_Color.jpg   _NormalGL _NormalDX _Roughness _Metalness _Displacement
+    Poly Haven   rock_wall_diff_1k.jpg        _nor_gl_ _nor_dx_ _rough_ _metal_ _disp_ _arm_
+
+Images come from the internet: a header may promise any size and data may end anywhere. What a header says is
+compared with the limits before a pixel is read, and only formats with a small, well-tested decoder are read.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import warnings
+from collections import defaultdict
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+MAX_FILE_BYTES = 128 * 2**20
+MAX_PIXELS = 8192 * 8192
+
+_SUFFIXES = r"\.(?:jpe?g|png)$"
+_AMBIENT_CG = re.compile(
+    r"(?P<set>.+)_(?P<map>color|normalgl|normaldx|roughness|metalness|displacement)" + _SUFFIXES,
+    re.IGNORECASE,
+)
+_POLY_HAVEN = re.compile(
+    r"(?P<set>.+)_(?P<map>diff|diffuse|col|albedo|nor_gl|nor_dx|rough|metal|disp|arm)_(?P<size>\d+k)"
+    + _SUFFIXES,
+    re.IGNORECASE,
+)
+_ROLES = {
+    **dict.fromkeys(("color", "diff", "diffuse", "col", "albedo"), "colour"),
+    **dict.fromkeys(("normalgl", "nor_gl"), "normal_gl"),
+    **dict.fromkeys(("normaldx", "nor_dx"), "normal_dx"),
+    **dict.fromkeys(("roughness", "rough"), "roughness"),
+    **dict.fromkeys(("metalness", "metal"), "metallic"),
+    **dict.fromkeys(("displacement", "disp"), "height"),
+    "arm": "arm",
+}
+
+
+class RefusedImageError(Exception):
+    """Why an image or a set is not used: a short clause that names the file."""
+
+
+@dataclass(frozen=True)
+class TextureSet:
+    """path: folder and common name of the files. files: role ("colour", "normal_gl", "normal_dx",
+    "roughness", "metallic", "height", "arm") -> file."""
+
+    path: Path
+    files: dict[str, Path]
+
+
+def sets_below(path: Path, deep: bool = True) -> list[TextureSet]:
+    """The sets of a folder, and of its subfolders where `deep`, sorted; links to folders are not followed."""
+    found: dict[Path, dict[str, Path]] = defaultdict(dict)
+    for folder, subfolders, names in os.walk(path):
+        subfolders[:] = sorted(subfolders) if deep else []
+        for name in sorted(names):
+            match = _POLY_HAVEN.fullmatch(name) or _AMBIENT_CG.fullmatch(name)
+            if match:
+                parts = match.groupdict()
+                stem = parts["set"] + (f"_{parts['size']}" if parts.get("size") else "")
+                found[Path(folder) / stem].setdefault(_ROLES[parts["map"].lower()], Path(folder) / name)
+    return [TextureSet(key, found[key]) for key in sorted(found)]
+
+
+def set_at(path: Path) -> TextureSet:
+    """The set named by `path`: its common name, or a folder that holds just one. RefusedImageError."""
+    if path.is_dir():
+        found = sets_below(path)
+        if len(found) != 1:
+            raise RefusedImageError(f"the folder holds {len(found)} texture sets; name one")
+        return found[0]
+    for candidate in sets_below(path.parent, deep=False) if path.parent.is_dir() else []:
+        if candidate.path == path:
+            return candidate
+    raise RefusedImageError("no texture set (ambientCG or Poly Haven file names) has this name")
+
+
+def read_bounded(path: Path) -> bytes:
+    """The file's bytes. Raises RefusedImageError where it is missing, no file or too large."""
+    try:
+        if not path.is_file():
+            raise RefusedImageError(f"{path.name} is missing or not a file")
+        with path.open("rb") as file:
+            data = file.read(MAX_FILE_BYTES + 1)
+    except OSError as error:
+        raise RefusedImageError(f"{path.name} cannot be opened ({error.strerror})") from None
+    if len(data) > MAX_FILE_BYTES:
+        raise RefusedImageError(f"{path.name} is larger than {MAX_FILE_BYTES >> 20} MiB")
+    return data
+
+
+def decode_image(data: bytes, name: str, size: int) -> np.ndarray:
+    """(H, W, C) float32 in 0..1 as encoded, C 1 or 3; a JPEG much larger than `size` comes reduced.
+
+    Raises RefusedImageError that names the image.
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            image = Image.open(BytesIO(data), formats=("JPEG", "PNG"))
+        width, height = image.size
+        if width * height > MAX_PIXELS:
+            raise RefusedImageError(
+                f"{name} has {width} x {height} pixels, more than {MAX_PIXELS >> 20} million"
+            )
+        if min(width, height) < 8:
+            raise RefusedImageError(f"{name} has {width} x {height} pixels, fewer than 8 x 8")
+        image.draft(image.mode, (2 * size, 2 * size))
+        if image.mode.startswith("I"):
+            return np.asarray(image, dtype=np.float32)[..., None] / np.float32(65535)
+        pixels = np.asarray(image.convert("L" if image.mode in ("1", "L", "LA") else "RGB"))
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError, MemoryError) as error:
+        raise RefusedImageError(f"{name} is no readable JPEG or PNG ({error})") from None
+    return np.atleast_3d(pixels).astype(np.float32) / np.float32(255)
+
+
+def resampled(image: np.ndarray, size: int) -> np.ndarray:
+    """(H, W, C) to (size, size, C), periodic, anti-aliased; oblong images are repeated where that fits."""
+    height, width = image.shape[:2]
+    if max(width, height) % min(width, height) == 0:
+        image = np.tile(image, (max(1, width // height), max(1, height // width), 1))
+        height, width = image.shape[:2]
+    if (height, width) == (size, size):
+        return image
+    pad = (min(4 * (height // size + 1), height), min(4 * (width // size + 1), width))
+    box = (pad[1], pad[0], pad[1] + width, pad[0] + height)
+    out = np.empty((size, size, image.shape[2]), np.float32)
+    for channel in range(image.shape[2]):
+        plane = np.pad(image[..., channel], ((pad[0],) * 2, (pad[1],) * 2), mode="wrap")
+        small = Image.fromarray(plane).resize((size, size), Image.Resampling.BICUBIC, box=box)
+        out[..., channel] = np.asarray(small)
+    return np.clip(out, 0.0, 1.0)

@@ -1,0 +1,249 @@
+"""Texture folders: names, colours, relief, and images that must not be believed."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from fsid.assets import bake_material, material_colours, material_tile_m, survey_textures, texture_sources
+from fsid.assets import texture_files as files
+from fsid.assets.patterns import noise
+from fsid.assets.textures import TILE_M, integrated, slopes_of
+from fsid.assets.triangle import decode, enclosing, encode, hex_colours, srgb_to_linear
+from fsid.errors import FsidError
+
+SIZE = 128
+
+
+@pytest.fixture(autouse=True)
+def own_cache(tmp_path_factory, monkeypatch):
+    monkeypatch.setenv("FSID_CACHE", str(tmp_path_factory.mktemp("cache")))
+    survey_textures.cache_clear()
+
+
+def picture(seed: int = 0, size: int = SIZE) -> np.ndarray:
+    """(S, S, 3) uint8 of many colours."""
+    rng = np.random.default_rng(seed)
+    fields = [noise(rng, size, 1.2) for _ in range(3)]
+    return np.uint8(np.clip(128 + 50 * np.stack(fields, -1), 0, 255))
+
+
+def hill(size: int = SIZE) -> tuple[np.ndarray, np.ndarray]:
+    """(height in tile widths, its OpenGL normal map 0..1)."""
+    t = (np.arange(size) + 0.5) / size
+    u, v = np.meshgrid(t, t)
+    height = 0.02 * np.sin(2 * np.pi * 2 * u) * np.cos(2 * np.pi * 3 * v) + 0.01 * np.sin(2 * np.pi * v)
+    slope_u = 0.08 * np.pi * np.cos(4 * np.pi * u) * np.cos(6 * np.pi * v)
+    slope_v = -0.12 * np.pi * np.sin(4 * np.pi * u) * np.sin(6 * np.pi * v) + 0.02 * np.pi * np.cos(
+        2 * np.pi * v
+    )
+    normal = np.stack([-slope_u, slope_v, np.ones_like(u)], axis=-1)
+    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+    return height, (normal + 1) / 2
+
+
+def save(path: Path, image: np.ndarray) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if image.dtype != np.uint8 and image.dtype != np.uint16:
+        image = np.uint8(np.rint(image * 255))
+    Image.fromarray(image).save(path)
+
+
+@pytest.fixture
+def folder(tmp_path) -> Path:
+    """Two sets in ambientCG names, two in those of Poly Haven."""
+    _, normal = hill()
+    grey = np.full((SIZE, SIZE), 0.3)
+    save(tmp_path / "Bricks001_1K-PNG" / "Bricks001_1K-PNG_Color.png", picture())
+    save(tmp_path / "Bricks001_1K-PNG" / "Bricks001_1K-PNG_NormalGL.png", normal)
+    save(tmp_path / "Bricks001_1K-PNG" / "Bricks001_1K-PNG_Roughness.png", grey)
+    save(tmp_path / "Metal002_2K-PNG_Color.png", picture(1))
+    save(tmp_path / "Metal002_2K-PNG_Metalness.png", grey * 0 + 1)
+    save(tmp_path / "rock_wall" / "rock_wall_diff_1k.png", picture(2))
+    save(tmp_path / "rock_wall" / "rock_wall_arm_1k.png", np.dstack([grey, grey * 2, grey * 3]))
+    save(tmp_path / "rock_wall" / "rock_wall_nor_gl_1k.png", normal)
+    save(
+        tmp_path / "rock_wall" / "rock_wall_disp_1k.png",
+        np.uint16(65535 * np.clip(0.5 + hill()[0] * 9, 0, 1)),
+    )
+    save(tmp_path / "plain_diff_1k.jpg", picture(3))
+    return tmp_path
+
+
+def test_both_naming_schemes_are_found_with_whatever_maps_they_have(folder):
+    names = texture_sources(folder)
+    assert names == tuple(
+        f"file:{folder / part}"
+        for part in (
+            "Bricks001_1K-PNG/Bricks001_1K-PNG",
+            "Metal002_2K-PNG",
+            "plain_1k",
+            "rock_wall/rock_wall_1k",
+        )
+    )
+    bricks, metal, plain, rock = (bake_material(name, 0, SIZE) for name in names)
+    assert bricks.roughness.mean() == pytest.approx(0.3, abs=0.01)
+    assert metal.metallic.min() == 1
+    assert (plain.metallic == 0).all()
+    assert np.ptp(plain.height) == 0
+    assert rock.roughness.mean() == pytest.approx(0.6, abs=0.01)
+    assert rock.metallic.mean() == pytest.approx(0.9, abs=0.01)
+    assert material_tile_m(names[0]) == bricks.tile_m == TILE_M
+
+
+def test_colours_are_those_of_the_picture(folder):
+    name = texture_sources(folder)[0]
+    maps = bake_material(name, 0, SIZE)
+    assert maps.colours == material_colours(name, 0) == bake_material(name, 3, 64).colours
+    shown = decode(maps.mix, maps.pattern, maps.detail, maps.colours)
+    error = np.abs(shown - srgb_to_linear(picture() / 255))
+    assert error.max() < 2.0 / 255
+    assert np.sqrt((error**2).mean()) < 0.5 / 255
+
+
+def test_a_folder_with_one_set_is_a_name_too(folder):
+    by_folder = bake_material(f"file:{folder / 'rock_wall'}", 0, 64)
+    by_prefix = bake_material(f"file:{folder / 'rock_wall' / 'rock_wall_1k'}", 0, 64)
+    np.testing.assert_array_equal(by_folder.height, by_prefix.height)
+
+
+def test_a_layer_lies_over_a_texture_set(folder):
+    name = texture_sources(folder)[0]
+    bare, dusty = bake_material(name, 0, 64), bake_material(f"{name}+dust", 0, 64)
+    assert dusty.colours == bare.colours
+    assert dusty.detail.std() < bare.detail.std()
+
+
+def test_height_from_a_normal_map_has_its_slopes(folder):
+    truth, _ = hill()
+    maps = bake_material(texture_sources(folder)[0], 0, SIZE)
+    metres = (maps.height - maps.height.mean()) * maps.relief_m
+    np.testing.assert_allclose(metres, (truth - truth.mean()) * maps.tile_m, atol=6e-4)
+
+
+def test_displacement_gets_its_range_from_the_normal_map(folder):
+    """The displacement map alone does not say how many metres it spans."""
+    maps = bake_material(f"file:{folder / 'rock_wall'}", 0, SIZE)
+    assert maps.relief_m == pytest.approx(np.ptp(hill()[0]) * maps.tile_m, rel=0.03)
+
+
+def test_directx_normals_are_turned_over():
+    _, normal = hill()
+    other = normal * (1, -1, 1) + (0, 1, 0)
+    np.testing.assert_allclose(slopes_of(normal, 1.0), slopes_of(other, -1.0), atol=1e-12)
+
+
+def test_integration_inverts_differentiation():
+    truth, normal = hill()
+    np.testing.assert_allclose(integrated(slopes_of(normal, 1.0)), truth - truth.mean(), atol=1e-5)
+
+
+@pytest.mark.parametrize("shape", [(96, 96), (64, 128), (300, 200), (256, 64)])
+def test_any_resolution_and_shape_gives_square_tiles(tmp_path, shape):
+    save(tmp_path / "a_diff_1k.png", picture(4, 512)[: shape[0], : shape[1]])
+    maps = bake_material(texture_sources(tmp_path)[0], 0, 128)
+    assert maps.detail.shape == (128, 128)
+
+
+def test_resampling_is_periodic():
+    """A seam would show as a step between the last and the first row."""
+    t = (np.arange(200) + 0.5) / 200
+    wave = np.sin(2 * np.pi * t)[:, None, None] * np.ones((1, 200, 1)) / 2.5 + 0.5
+    out = files.resampled(wave.astype(np.float32), 64)[..., 0]
+    wanted = np.sin(2 * np.pi * (np.arange(64) + 0.5) / 64) / 2.5 + 0.5
+    np.testing.assert_allclose(out, np.broadcast_to(wanted[:, None], (64, 64)), atol=2e-3)
+
+
+def bomb(width: int, height: int) -> bytes:
+    """A PNG of a few kilobytes whose header promises width x height pixels."""
+
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    header = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
+    data = zlib.compress(bytes(100_000))
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", data) + chunk(b"IEND", b"")
+
+
+def test_broken_hostile_and_huge_images_are_skipped_and_counted(folder, monkeypatch):
+    monkeypatch.setattr(files, "MAX_FILE_BYTES", 200_000)
+    good = len(texture_sources(folder))
+    survey_textures.cache_clear()
+    truncated = (folder / "rock_wall" / "rock_wall_diff_1k.png").read_bytes()[:2000]
+    bad = {
+        "truncated_diff_1k.png": truncated,
+        "empty_diff_1k.jpg": b"",
+        "text_diff_1k.jpg": b"not an image",
+        "bomb_diff_1k.png": bomb(60_000, 60_000),
+        "wide_diff_1k.png": bomb(9_000, 9_000),
+        "lying_diff_1k.png": bomb(4_000, 4_000),
+        "tiny_diff_1k.png": bomb(3, 3),
+        "huge_diff_1k.png": bytes(200_001),
+        "colourless_rough_1k.png": (folder / "plain_diff_1k.jpg").read_bytes(),
+    }
+    for name, data in bad.items():
+        (folder / name).write_bytes(data)
+    (folder / "dangling_diff_1k.png").symlink_to(folder / "nowhere.png")
+    survey = survey_textures(str(folder))
+    assert len(survey.usable) == good
+    reasons = {Path(name.removeprefix("file:")).name: reason for name, reason in survey.skipped}
+    assert len(reasons) == len(bad) + 1
+    assert "no colour map" in reasons["colourless_1k"]
+    assert "more than" in reasons["wide_1k"]
+    assert all("\n" not in reason for reason in reasons.values())
+
+
+@pytest.mark.parametrize("name", ["nowhere", "nowhere/set_1k"])
+def test_bad_names_raise_one_line(tmp_path, name):
+    with pytest.raises(FsidError, match="no texture set"):
+        bake_material(f"file:{tmp_path / name}", 0, 64)
+    with pytest.raises(FsidError, match="no such folder"):
+        texture_sources(tmp_path / name)
+
+
+def test_a_folder_without_textures_says_so(tmp_path):
+    with pytest.raises(FsidError, match="no usable texture set"):
+        texture_sources(tmp_path)
+
+
+def test_a_changed_file_is_another_material(folder):
+    name = f"file:{folder / 'plain_1k'}"
+    before = bake_material(name, 0, 64)
+    save(folder / "plain_diff_1k.jpg", picture(9))
+    assert not np.array_equal(before.detail, bake_material(name, 0, 64).detail)
+
+
+class TestTriangle:
+    def test_encoding_inverts_decoding(self):
+        rng = np.random.default_rng(0)
+        masks = [rng.random((50, 50)).astype(np.float32) * 0.9 + 0.05 for _ in range(3)]
+        colours = hex_colours("c04030 40b050 3050c0")
+        for found, mask in zip(encode(decode(*masks, colours), colours), masks, strict=True):
+            np.testing.assert_allclose(found, mask, atol=2e-5)
+
+    @pytest.mark.parametrize("kind", ["gamut", "grey", "black", "white and red", "one colour"])
+    def test_every_picture_fits_its_triangle(self, kind):
+        rng = np.random.default_rng(1)
+        rgb = {
+            "gamut": rng.random((4096, 3)),
+            "grey": np.repeat(rng.random((4096, 1)), 3, 1),
+            "black": np.zeros((4096, 3)),
+            "white and red": np.array([(1.0, 1.0, 1.0), (1.0, 0.0, 0.0)] * 2048),
+            "one colour": np.tile((0.2, 0.5, 0.1), (4096, 1)),
+        }[kind].astype(np.float32)
+        colours = enclosing(rgb)
+        masks = encode(rgb, colours)
+        rounded = [np.rint(m * n) / np.float32(n) for m, n in zip(masks, (255, 255, 254), strict=True)]
+        error = np.abs(decode(*rounded, colours) - rgb)
+        assert error.max() < 2.0 / 255
+        assert np.sqrt((error**2).mean()) < 0.8 / 255
+
+    def test_hex_colours_are_srgb(self):
+        np.testing.assert_allclose(
+            hex_colours("ffffff 000000 bcbcbc"), [[1] * 3, [0] * 3, [0.5029] * 3], atol=1e-4
+        )
