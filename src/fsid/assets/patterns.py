@@ -5,8 +5,9 @@
     warp      periodic look-up at displaced coordinates
     ink       lines, shapes and glyphs drawn with PIL, with anti-aliasing, wrapped at the borders
 
-Frequencies and lengths are in cycles or fractions of a tile, so a family looks alike at every size; the
-highest frequencies are set by the texel, because detail down to one texel is what a denoiser must learn.
+Frequencies and lengths are in cycles or fractions of a tile, so a family looks alike at every size; edges
+are as sharp as the texel allows and grain ends at three texels: fine texture is what a denoiser must learn
+to keep, noise of single texels what it must learn to remove.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 from PIL import Image, ImageDraw
-from scipy.fft import irfft2, rfft2
+from scipy.fft import irfft2
 from scipy.ndimage import map_coordinates
 from scipy.special import ndtr
 
@@ -38,12 +39,12 @@ def noise(
 ) -> np.ndarray:
     """(S, S) float32 Gaussian noise, mean 0, variance 1, amplitude ~ f^-slope between low and high.
 
-    low, high: cycles per tile, soft edges. stretch: how many times longer the features are along u and v;
-    such a field is cut off at the texel across the features and proportionally earlier along them.
+    low, high: cycles per tile, soft edges; high is at most S / 3, because noise of single texels looks like a
+    sensor's. stretch: how many times longer the features are along u and v; across them such a field is cut
+    off there, too, and proportionally earlier along them.
     """
-    if stretch != (1.0, 1.0):
-        high = min(high, size / 2)
-    white = rng.standard_normal((size, size), dtype=np.float32)
+    high = min(high, size / 3)
+    white = rng.standard_normal((size, size // 2 + 1, 2), dtype=np.float32).view(np.complex64)[..., 0]
     fx = np.arange(size // 2 + 1, dtype=np.float32)[None] * np.float32(stretch[0])
     fy = (np.fft.fftfreq(size, 1 / size).astype(np.float32) * np.float32(stretch[1]))[:, None]
     f2 = fx * fx + fy * fy
@@ -51,11 +52,11 @@ def noise(
     gain = f2 ** np.float32(-slope / 2)
     if low > 1.0:
         gain *= np.exp(-((low * low / f2) ** 2))
-    if np.isfinite(high):
-        gain *= np.exp(-np.minimum((f2 / (high * high)) ** 2, 80))
+    gain *= np.exp(-np.minimum((f2 / (high * high)) ** 2, 80))
     gain[0, 0] = 0.0
-    field = irfft2(rfft2(white) * gain, s=(size, size))
-    return field / (field.std() + 1e-12)
+    gain[:, 0] *= np.float32(np.sqrt(2))  # the inverse keeps but the symmetric half of this column
+    field = irfft2(white * gain, s=(size, size))
+    return field / (field.std() + np.float32(1e-12))
 
 
 def level(field: np.ndarray, softness: float = 1.0) -> np.ndarray:
