@@ -35,18 +35,32 @@ def cache_key(path: Path, member: str) -> str:
 
 def load_mesh(key: str) -> Mesh | None:
     """The mesh stored under a key, None where there is none. Raises the RefusedError stored instead."""
+    stored = _load(key, ("vertices", "normals", "faces", "face_parts", "part_names"))
+    if stored is None:
+        return None
+    *arrays, names = stored
+    vertices, normals, faces, face_parts = arrays
+    return Mesh(vertices, normals, faces, face_parts, tuple(str(name) for name in names))
+
+
+def load_measures(key: str) -> np.ndarray | None:
+    """(4,) `measures` of the mesh stored under a key, which are read without it; else as `load_mesh`."""
+    stored = _load(key, ("measures",))
+    return stored[0] if stored else None
+
+
+def measures(mesh: Mesh) -> np.ndarray:
+    """(4,) float64: size along x, y and z in metres, and the number of triangles."""
+    return np.r_[np.ptp(mesh.vertices, axis=0), len(mesh.faces)].astype(np.float64)
+
+
+def _load(key: str, names: tuple[str, ...]) -> list[np.ndarray] | None:
     folder = _folder()
     if folder is None:
         return None
     try:
         with np.load(folder / f"{key}.npz", allow_pickle=False) as stored:
-            return Mesh(
-                vertices=stored["vertices"],
-                normals=stored["normals"],
-                faces=stored["faces"],
-                face_parts=stored["face_parts"],
-                part_names=tuple(str(name) for name in stored["part_names"]),
-            )
+            return [stored[name] for name in names]
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         pass
     try:
@@ -66,6 +80,7 @@ def store_mesh(key: str, mesh: Mesh) -> None:
         faces=mesh.faces,
         face_parts=mesh.face_parts,
         part_names=np.array(mesh.part_names),
+        measures=measures(mesh),
     )
     _replace(f"{key}.npz", buffer.getvalue())
 

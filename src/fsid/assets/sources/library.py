@@ -21,7 +21,14 @@ from urllib.parse import unquote
 import numpy as np
 
 from fsid.assets.mesh import Mesh
-from fsid.assets.sources.cache import cache_key, load_mesh, store_mesh, store_refusal
+from fsid.assets.sources.cache import (
+    cache_key,
+    load_measures,
+    load_mesh,
+    measures,
+    store_mesh,
+    store_refusal,
+)
 from fsid.assets.sources.catalogue import Entry, read_catalogue, read_member
 from fsid.assets.sources.cleaning import Triangles, clean
 from fsid.assets.sources.limits import MAX_FILE_BYTES, RefusedError
@@ -82,12 +89,11 @@ def survey_meshes(
             skipped.append((name, f"licence '{licence or 'unknown'}' is not CC0"))
             continue
         try:
-            mesh = _mesh(name)
+            x, y, z, triangles = _measures(name)
         except RefusedError as error:
             skipped.append((name, str(error)))
             continue
-        x, y, z = (float(side) for side in np.ptp(mesh.vertices, axis=0))
-        usable.append(MeshSource(name, licence, (x, y, z), len(mesh.faces)))
+        usable.append(MeshSource(name, licence, (float(x), float(y), float(z)), int(triangles)))
     progress(len(found), len(found))
     if not usable:
         why = f"; the first of {len(skipped)} skipped: {skipped[0][1]}" if skipped else ""
@@ -103,13 +109,22 @@ def load_source(name: str) -> Mesh:
         raise FsidError(f"{name.removeprefix(PREFIX)}: {error}") from None
 
 
+def _measures(name: str) -> np.ndarray:
+    found = load_measures(_key(*_split(name)))
+    return measures(_mesh(name)) if found is None else found
+
+
+def _key(path: Path, member: str) -> str:
+    try:
+        return cache_key(path, member)
+    except (OSError, ValueError) as error:
+        raise RefusedError(f"cannot be opened ({error})") from None
+
+
 def _mesh(name: str) -> Mesh:
     """From the cache, or made and put there. Raises RefusedError."""
     path, member = _split(name)
-    try:
-        key = cache_key(path, member)
-    except (OSError, ValueError) as error:
-        raise RefusedError(f"cannot be opened ({error})") from None
+    key = _key(path, member)
     mesh = load_mesh(key)
     if mesh is None:
         try:
