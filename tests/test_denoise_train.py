@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import signal
 import subprocess
 import sys
@@ -17,7 +18,7 @@ torch = pytest.importorskip("torch")
 
 from safetensors.torch import load_file  # noqa: E402
 
-from fsid.config import load_settings  # noqa: E402
+from fsid.config import load_settings, save_settings  # noqa: E402
 from fsid.dataset.shards import shard_path, write_shard  # noqa: E402
 from fsid.denoise import (  # noqa: E402
     NetworkConfig,
@@ -28,6 +29,7 @@ from fsid.denoise import (  # noqa: E402
     train,
 )
 from fsid.denoise.train import learning_rate  # noqa: E402
+from fsid.denoise.validate import held_out, validation  # noqa: E402
 from fsid.errors import FsidError  # noqa: E402
 from fsid.sensor import Raw, add_noise, clean_levels, load_profile, write_dng  # noqa: E402
 
@@ -41,6 +43,7 @@ CONFIG = TrainConfig(
     log_every=3,
     checkpoint_every=2,
     threads=1,
+    tensorboard=False,
 )
 
 KILLED_TRAINING = """
@@ -65,17 +68,18 @@ def patches_of_colour(rng: np.random.Generator, size: int = 96) -> Raw:
     return Raw(x, "GBRG", 64, 1023, (2.0, 1.0, 1.5), np.eye(3))
 
 
+def stored(rng: np.random.Generator, number: int) -> tuple[str, dict[str, bytes]]:
+    buffer = io.BytesIO()
+    write_dng(buffer, clean_levels(patches_of_colour(rng)))
+    return f"{number:08d}", {"clean.dng": buffer.getvalue()}
+
+
 @pytest.fixture(scope="module")
 def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
     rng = np.random.default_rng(1)
     folder = tmp_path_factory.mktemp("data")
 
-    def sample(number: int) -> tuple[str, dict[str, bytes]]:
-        buffer = io.BytesIO()
-        write_dng(buffer, clean_levels(patches_of_colour(rng)))
-        return f"{number:08d}", {"clean.dng": buffer.getvalue()}
-
-    write_shard(shard_path(folder, 0), [sample(n) for n in range(4)])
+    write_shard(shard_path(folder, 0), [stored(rng, number) for number in range(4)])
     return folder
 
 
@@ -110,6 +114,55 @@ def test_a_killed_training_ends_with_the_same_bits(data: Path, tmp_path: Path) -
     assert train(data, tmp_path / "b", CONFIG, quiet=True).read_bytes() == undisturbed.read_bytes()
 
 
+def test_two_processes_train_one_network(data: Path, tmp_path: Path) -> None:
+    """Each draws its own patches, gradients are averaged, and one of them writes."""
+    arguments = ["train", str(data), "-o", str(tmp_path / "run"), "--quiet"]
+    save_settings(replace(CONFIG, steps=6, checkpoint_every=3), tmp_path / "config.yaml")
+    launch = [sys.executable, "-m", "torch.distributed.run", "--standalone", "--nproc-per-node", "2"]
+    command = [*launch, "-m", "fsid", *arguments, "--config", str(tmp_path / "config.yaml")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    sessions = json.loads((tmp_path / "run" / "sessions.json").read_text())
+    assert [(row["processes"], row["first_step"], row["last_step"]) for row in sessions] == [(2, 0, 6)]
+    both = load_file(tmp_path / "run" / "model.safetensors")
+    alone = load_file(train(data, tmp_path / "alone", replace(CONFIG, steps=6), quiet=True))
+    assert any(not torch.equal(both[name], alone[name]) for name in both)
+
+
+def test_the_best_network_on_held_out_scenes_is_kept(tmp_path: Path) -> None:
+    """A learning rate that ends in ruin: the best network is an early one, and the last one is worse."""
+    folder, rng = tmp_path / "data", np.random.default_rng(3)
+    folder.mkdir()
+    write_shard(shard_path(folder, 0), [stored(rng, number) for number in range(10)])
+    config = replace(CONFIG, steps=40, held_out=2, validate_every=5, learning_rate=0.05, clip_norm=1e3)
+    model = train(folder, tmp_path / "run", config, quiet=True)
+    rows = json.loads((tmp_path / "run" / "validation.json").read_text())
+    assert [row["step"] for row in rows] == list(range(5, 41, 5))
+    scores = [row["psnr_scenes"] for row in rows]
+    assert max(scores) > scores[-1]
+    card = json.loads(model.with_suffix(".json").read_text())
+    assert card["details"]["validation"] == [rows[int(np.argmax(scores))]]
+    assert card["details"]["config"]["seed"] == 0
+    assert card["sessions"][-1]["first_step"] == 0
+    assert card["training"].startswith("8 images")
+    last = load_model(tmp_path / "run" / "last.safetensors").net.state_dict()
+    watch = validation(held_out(folder, config), config, torch.device("cpu"))
+    assert watch.measure(last)["psnr_scenes"] == pytest.approx(scores[-1], abs=1e-9)
+    best = load_model(model).net.state_dict()
+    assert watch.measure(best)["psnr_scenes"] == pytest.approx(max(scores), abs=1e-9)
+
+
+def test_photographs_are_watched_and_do_not_choose(data: Path, photos: Path, tmp_path: Path) -> None:
+    watched = {"validate_every": 4, "validation_photos": str(photos), "tensorboard": True}
+    config = replace(CONFIG, steps=4, **watched)
+    model = train(data, tmp_path / "run", config, quiet=True)
+    (row,) = json.loads((tmp_path / "run" / "validation.json").read_text())
+    assert 20 < row["psnr_photos"] < 60
+    assert "psnr_scenes" not in row  # four images are too few to hold one out
+    assert list((tmp_path / "run" / "tensorboard").iterdir())
+    assert model.exists()
+
+
 def test_progress_replaces_the_live_line_and_quiet_is_silent(
     data: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -131,7 +184,7 @@ def test_learning_rate_rises_and_falls() -> None:
     assert rates[-1] == pytest.approx(0.01, rel=0.1)
 
 
-@pytest.mark.parametrize("name", ["nafnet-tiny", "nafnet-small"])
+@pytest.mark.parametrize("name", ["nafnet-tiny", "nafnet-small", "nafnet-32", "nafnet-64"])
 def test_shipped_configs_are_valid(name: str) -> None:
     with as_file(files("fsid.configs").joinpath(f"{name}.yaml")) as file:
         assert load_settings(TrainConfig, file).steps > 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 import sys
 from pathlib import Path
@@ -45,5 +46,5 @@ def train(
     settings = train_config(output / "config.yaml" if resume else config, set)
     command = shlex.join(["fsid", *sys.argv[1:]])
     model = train_network(data, output, settings, resume=resume, quiet=quiet, command=command)
-    if not quiet:
+    if not quiet and os.environ.get("RANK", "0") == "0":
         Console(stderr=True).print(f"model: {model}", soft_wrap=True)

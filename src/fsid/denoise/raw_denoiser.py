@@ -52,7 +52,9 @@ class RawDenoiser(nn.Module):
         )
         for parameter in self.net.ending.parameters():
             nn.init.zeros_(parameter)
-        self.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+        for module in self.modules():
+            if isinstance(module, nn.Conv2d) and module.kernel_size != (1, 1):
+                module.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
 
     def forward(self, noisy: Tensor, k: Tensor, sigma2: Tensor) -> Tensor:
         """noisy (B, 4, H, W) normalised, RGGB geometry; k, sigma2 (B, 4) -> (B, 4, H, W), not clipped."""

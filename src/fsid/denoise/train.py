@@ -65,7 +65,8 @@ def train(
     """
     if config.threads:
         torch.set_num_threads(config.threads)
-    accelerator = Accelerator(mixed_precision="bf16" if torch.cuda.is_available() else "no")
+    gpu = torch.cuda.is_available()
+    accelerator = Accelerator(cpu=not gpu, mixed_precision="bf16" if gpu else "no")
     is_main = accelerator.is_main_process
     kept = held_out(data_dir, config)
     patches = PatchDataset(data_dir, _patch_config(config, len(kept)), config.seed, accelerator.process_index)
@@ -81,7 +82,7 @@ def train(
         batch_size=None,
         sampler=range(state.step, config.steps),
         num_workers=config.loader_processes,
-        pin_memory=torch.cuda.is_available(),
+        pin_memory=gpu,
     )
     shown = is_main and not quiet and progress is None
     with LiveLine(config, state.step, accelerator.num_processes, quiet=not shown) as live:
