@@ -135,3 +135,30 @@ def test_dark_frames_that_are_clipped_are_refused():
 def test_frames_of_different_size_are_refused():
     with pytest.raises(FsidError, match=r"\(4, 6\)"):
         _frames(np.zeros((4, 4)), np.zeros((4, 6)))
+
+
+ISOS = tuple(50.0 * 2**stop for stop in range(10))  # 50 .. 25600
+
+
+@pytest.mark.parametrize(("camera", "isos"), [("pixel6", ISOS), ("galaxy-s22", ISOS[-2:])])
+def test_ten_isos_are_unbiased_over_twenty_seeds(camera, isos):
+    """From read noise far below one DN (Pixel 6, ISO 50) to noise cut off at DN 0 (Galaxy S22, ISO 25600)."""
+    profile, side = load_profile(camera), 64
+    ramp = np.broadcast_to(np.linspace(0, 0.95, side, dtype=np.float32) ** 2, (side, side))
+    error = np.empty((len(isos), 20, 2))
+    for row, iso in enumerate(isos):
+        level = profile.level(iso)
+        truth = np.array([level.k, level.sigma2]) * [[profile.span], [profile.span**2]]
+        for seed in range(20):
+            rng = np.random.default_rng([seed, row])
+            bursts = []
+            for mosaic, frames in ((ramp, 50), (0 * ramp, 20)):
+                stacked = np.tile(mosaic, (frames, 1))
+                clean = Raw(stacked, profile.cfa, 64, 1023, (2, 1, 1.6), np.eye(3))
+                noisy = to_dn(noisy_from_clean(rng, clean, iso, level))
+                bursts.append(_frames(*noisy.reshape(frames, side, side)))
+            fit = fit_noise(bursts[:1], cfa=profile.cfa, white_level=1023, dark=bursts[1])
+            error[row, seed] = np.mean(np.array([fit.k_dn, fit.sigma2_dn]) / truth - 1, axis=1)
+    bias, scatter = error.mean(axis=1), error.std(axis=1) / np.sqrt(20)
+    assert np.all(np.abs(bias) < [0.01, 0.02] + 3.5 * scatter)
+    assert np.all(np.abs(bias) < [0.02, 0.05])

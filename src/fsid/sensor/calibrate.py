@@ -7,10 +7,10 @@ pattern. Pixels of like mean are pooled, and each pool weighs as much as its var
 of the mean of N sample variances from n frames is 2 V^2 / (N (n - 1)). Unweighted, the bright pools drown the
 intercept. Dark frames give black level and intercept directly; without them the black level must be known.
 
-Excluded: pixels that touched 0 or white in any frame, means above 70 % of the range (EMVA 1288, 6.6), and
-pixels whose variance no Gaussian noise explains (telegraph noise, something moved). sigma2_dn contains the
-rounding of the converter, 1/12 DN^2, as in every published table. That sum holds only where noise spreads
-over several integers: pools below `RESOLVED_DN2` say nothing, and no intercept is below 1/12 DN^2.
+Excluded: pixels that hardly ever left 0 or white, means above 70 % of the range (EMVA 1288, 6.6), and pixels
+whose variance no Gaussian noise explains (telegraph noise, something moved). What rounding and clipping make
+of noise is undone (`stored_noise`): sigma2_dn is the variance before the converter plus the 1/12 DN^2 that
+rounding adds wherever noise spreads over several integers, as in every published table.
 """
 
 from __future__ import annotations
@@ -23,16 +23,21 @@ from scipy.stats import chi2
 
 from fsid.errors import FsidError
 from fsid.sensor.quantise import ROUNDING_DN2
+from fsid.sensor.stored_noise import PLACES, before_clipping, before_rounding, dark_noise
 from fsid.sensor.temporal import TemporalStatistics
 
 LINEAR_SHARE = 0.7  # of the range above black; beyond it sensors saturate softly
 OUTLIER_PROBABILITY = 1e-6  # of Gaussian noise to look like a defective pixel
 OUTLIER_SHARE = 0.05  # of the pixels, above which the scene moved: sensors have fewer defects
 RESOLVED_DN2 = (
-    0.5  # above it rounding adds its 1/12 DN^2 within 0.1 % of the variance, wherever between integers
+    0.5  # above it rounding adds its 1/12 DN^2 within 0.1 % of the variance, wherever the mean lies
 )
+_LEAST_TAU2 = 0.08  # DN^2 of noise; with less, a pixel hardly ever leaves its integer
+_STEEPEST = 2.0  # times the error of the stored variance that of the restored one may be
+_LARGEST_CLIPPED_SHARE = 0.1  # of a pool; what is left beside the limit still tells the noise
 _MAX_POOLS = 256  # in the range
 _POOL_WIDTH = 8.0  # standard errors of a pixel's mean
+_NARROW_DN = 1.0  # a pool; over wider ones, what rounding takes from faint noise is no straight line
 _POOL_PIXELS = 200  # at least, but for the last one
 _GUIDES = 64  # parts of the pixels that tell how noise depends on light before there are pools
 _MIN_POOL_PIXELS = 50
@@ -44,7 +49,7 @@ class Samples:
     """Pooled pixels of one burst and one site.
 
     signal, variance: (m,) DN above black and DN^2. freedom: (m,) degrees of freedom. used: (m,) bool, False
-    where the fit leaves the pool out (beyond the linear range, or below the resolution of the converter).
+    where the fit leaves the pool out (beyond the linear range, or too little left by the converter).
     """
 
     signal: np.ndarray
@@ -87,21 +92,37 @@ def fit_noise(
     cfa: None for a monochrome sensor. black_level: DN, needed where there are no `dark` frames.
     """
     if dark is not None:
-        black = black_of(dark, cfa)
+        dark_samples, black = pool_dark(dark, cfa, white_level)
+        pooled = [dark_samples]
     elif black_level is not None:
-        black = np.full(1 if cfa is None else 4, float(black_level))
+        black, pooled = np.full(1 if cfa is None else 4, float(black_level)), []
     else:
         raise FsidError("calibration needs dark frames or the black level in DN")
-    groups = [*bursts, *([dark] if dark is not None else [])]
-    return fit_samples([pool(group, cfa, black, white_level) for group in groups], black)
+    return fit_samples([*pooled, *(pool(burst, cfa, black, white_level) for burst in bursts)], black)
 
 
-def black_of(dark: TemporalStatistics, cfa: str | None) -> np.ndarray:
-    """Mean DN of each site of dark frames."""
-    sites = [mean for mean, _ in dark.sites(cfa)]
-    if min(mean.size for mean in sites) == 0:
+def pool_dark(
+    dark: TemporalStatistics, cfa: str | None, white_level: int, black: np.ndarray | None = None
+) -> tuple[tuple[Samples, ...], np.ndarray]:
+    """(one `Samples` of one pool per site, level in DN of each site) of dark frames.
+
+    black: DN of each site, where it is known from shorter dark frames; else the level is the black level.
+    """
+    sites = dark.sites(cfa)
+    if min(mean.size for mean, _ in sites) < _MIN_POOL_PIXELS:
         raise FsidError("the dark frames are clipped everywhere; check that the lens was covered")
-    return np.array([mean.mean() for mean in sites])
+    found = []
+    for mean, variance in sites:
+        sound = variance <= _largest(dark.frames) * max(float(np.median(variance)), RESOLVED_DN2)
+        found.append(dark_noise(mean[sound], variance[sound], dark.frames, white_level))
+    levels = np.array([site.level for site in found])
+    signals = levels - (levels if black is None else black)
+    samples = []
+    for site, signal in zip(found, signals, strict=True):
+        known = np.isfinite(site.variance_error)
+        freedom = 2 * (site.variance / max(site.variance_error, 1e-9)) ** 2 if known else 0.0
+        samples.append(Samples(*(np.array([v]) for v in (signal, site.variance, freedom, known))))
+    return tuple(samples), levels
 
 
 def pool(
@@ -131,12 +152,27 @@ def _pool(mean: np.ndarray, variance: np.ndarray, frames: int, black: float, whi
     if signal.size < _MIN_POOL_PIXELS:
         return Samples(np.empty(0), np.empty(0), np.empty(0), np.empty(0, bool))
     starts = _starts(signal, variance, frames, white - black)
-    sound = _sound(signal, variance, starts, frames)
+    sound = _sound(signal, variance, starts, frames, LINEAR_SHARE * (white - black))
     count = np.add.reduceat(sound, starts, dtype=np.int64)
     full = count >= _MIN_POOL_PIXELS
-    signal, variance = (np.add.reduceat(v * sound, starts)[full] / count[full] for v in (signal, variance))
-    used = (signal < LINEAR_SHARE * (white - black)) & (variance > RESOLVED_DN2)
-    return Samples(signal, variance, count[full] * (frames - 1.0), used)
+    fractions = _fractions(signal + black, sound, starts)[full]
+    mean, stored = (np.add.reduceat(v * sound, starts)[full] / count[full] for v in (signal, variance))
+    level, unclipped, clipped = before_clipping(mean + black, stored, 0, white)
+    tau2, slope = before_rounding(unclipped, fractions)
+    resolved = (stored > RESOLVED_DN2) | ((tau2 > _LEAST_TAU2) & (slope < _STEEPEST))
+    used = (level - black < LINEAR_SHARE * (white - black)) & resolved & (clipped < _LARGEST_CLIPPED_SHARE)
+    restored = np.where(resolved, tau2 + ROUNDING_DN2, stored)
+    rarity = np.minimum(1, 2 * stored / np.maximum(1 - stored, stored))  # Gaussian against rare steps of 1 DN
+    freedom = count[full] * (frames - 1.0) * rarity * (restored / (slope * np.maximum(stored, 1e-9))) ** 2
+    return Samples(level - black, restored, freedom, used)
+
+
+def _fractions(level: np.ndarray, sound: np.ndarray, starts: np.ndarray) -> np.ndarray:
+    """(pools, PLACES) shares of the sound pixels by the fraction of their `level` in DN."""
+    place = (level % 1 * PLACES).astype(np.intp) % PLACES
+    pool_of = np.repeat(np.arange(len(starts)), np.diff(starts, append=level.size))
+    counts = np.bincount(pool_of * PLACES + place, sound, len(starts) * PLACES).reshape(-1, PLACES)
+    return counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
 
 
 def _starts(signal: np.ndarray, variance: np.ndarray, frames: int, span: float) -> np.ndarray:
@@ -151,26 +187,38 @@ def _starts(signal: np.ndarray, variance: np.ndarray, frames: int, span: float) 
     starts = [0]
     while True:
         start = starts[-1]
-        width = max(_POOL_WIDTH * float(np.interp(signal[start], middles, errors)), span / _MAX_POOLS)
+        width = max(
+            _POOL_WIDTH * float(np.interp(signal[start], middles, errors)), min(span / _MAX_POOLS, 1.0)
+        )
         end = max(int(np.searchsorted(signal, signal[start] + width)), start + _POOL_PIXELS)
         if end > signal.size - _MIN_POOL_PIXELS:
             return np.array(starts)
         starts.append(end)
 
 
-def _sound(signal: np.ndarray, variance: np.ndarray, starts: np.ndarray, frames: int) -> np.ndarray:
-    """(n,) False for pixels that vary more than Gaussian noise of the usual variance at their signal."""
+def _sound(
+    signal: np.ndarray, variance: np.ndarray, starts: np.ndarray, frames: int, limit: float
+) -> np.ndarray:
+    """(n,) False for pixels that vary more than Gaussian noise of the usual variance at their signal.
+
+    limit: signal beyond which saturation makes any variance; FsidError where too many below it vary.
+    """
     ends = [*starts[1:], signal.size]
     medians = [np.median(variance[a:b]) for a, b in zip(starts, ends, strict=True)]
     middles = [signal[a:b].mean() for a, b in zip(starts, ends, strict=True)]
-    largest = chi2.ppf(1 - OUTLIER_PROBABILITY, frames - 1) / chi2.median(frames - 1)
-    sound = variance <= largest * np.maximum(np.interp(signal, middles, medians), RESOLVED_DN2)
-    if sound.mean() < 1 - OUTLIER_SHARE:
+    sound = variance <= _largest(frames) * np.maximum(np.interp(signal, middles, medians), RESOLVED_DN2)
+    linear = sound[: np.searchsorted(signal, limit)]
+    if linear.size and linear.mean() < 1 - OUTLIER_SHARE:
         raise FsidError(
-            f"{100 * (1 - sound.mean()):.0f} % of the pixels vary more than noise does: the scene or the "
+            f"{100 * (1 - linear.mean()):.0f} % of the pixels vary more than noise does: the scene or the "
             f"camera moved during the burst; use a tripod and a static scene"
         )
     return sound
+
+
+def _largest(frames: int) -> float:
+    """The largest variance that Gaussian noise shows, in medians."""
+    return float(chi2.ppf(1 - OUTLIER_PROBABILITY, frames - 1) / chi2.median(frames - 1))
 
 
 def _line(samples: Samples) -> tuple[float, float, float, float]:

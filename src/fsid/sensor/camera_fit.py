@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from fsid.errors import FsidError
-from fsid.sensor.calibrate import NoiseFit, Samples, black_of, fit_samples, pool
+from fsid.sensor.calibrate import NoiseFit, Samples, fit_samples, pool, pool_dark
 from fsid.sensor.camera_profile import MONO, CameraProfile, Measurement
 from fsid.sensor.colour import published_matrices
 from fsid.sensor.frames import Frame, FrameSet, Layout, bursts, find_frames
@@ -27,7 +27,7 @@ from fsid.sensor.terms_fit import DarkFinding, dark_finding, fit_terms, prnu_of
 MIN_FRAMES = 3  # of one ISO; a variance from two is one number per pixel, and a defect looks like noise
 DARK_LEVEL = 0.05  # of the range, above which a dark frame saw light
 DARK_CONTRAST = 0.02  # of the range between blocks, above which a dark frame shows a picture
-CUT_OFF = 0.02  # of the dark pixels left out, above which the rest no longer show all of their noise
+CUT_OFF = 0.002  # of the dark values at 0, above which the noise that was cut off is worth a note
 UNCERTAIN = 0.02  # relative standard error of k that deserves a note
 _METHOD = "fsid calibrate: weighted line through pooled temporal variances per CFA site (sensor/calibrate.py)"
 
@@ -126,12 +126,12 @@ def _fit_iso(reader: _Reader, iso: float, tie_greens: bool) -> NoiseFit:
         if (finding := dark_finding(stats, iso, burst[0].exposure_s)) is not None:
             reader.dark.append(finding)
             fixed_dn2 = finding.fixed_dn2
-        if stats.clipped_share > CUT_OFF:
+        if stats.zero_share > CUT_OFF:
             reader.cut_off.append(iso)
+        samples, levels = pool_dark(stats, camera.cfa, camera.white_level, black if number > 0 else None)
         if number == 0:
-            black = black_of(stats, camera.cfa)
-        assert black is not None
-        pooled.append(pool(stats, camera.cfa, black, camera.white_level))
+            black = levels
+        pooled.append(samples)
     if black is None:
         raise FsidError(
             f"{lights[0].path}: ISO {iso:g} has no dark frames and no black level; "
@@ -186,7 +186,7 @@ def _notes(reader: _Reader, isos: Sequence[float], fits: Sequence[NoiseFit]) -> 
         if paths:
             yield f"{len(paths)} bursts, the first one that of {paths[0]}: {what}"
     for iso in sorted(set(reader.cut_off)):
-        yield f"ISO {iso:g}: dark noise reaches DN 0 and is cut off; sigma2 comes out too small"
+        yield f"ISO {iso:g}: dark noise reaches DN 0 and is cut off; corrected as far as it is Gaussian"
     for iso, fit in zip(isos, fits, strict=True):
         if (error := float(np.max(fit.k_dn_error / fit.k_dn))) > UNCERTAIN:
             yield f"ISO {iso:g}: k is uncertain by {100 * error:.1f} %; take more frames"

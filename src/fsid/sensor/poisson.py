@@ -67,7 +67,7 @@ def _few(rng: np.random.Generator, lam: np.ndarray) -> np.ndarray:
 
 @cache
 def _alias_table() -> np.ndarray:
-    """(rows * 64,) uint32, a column per count: 26 bits what it keeps of its share, 6 bits who has the rest."""
+    """(rows * 64,) uint32, a column per count: 26 bits its share of itself, 6 bits whose the rest is."""
     rows = np.arange(int(EXACT_BELOW * _PER_ELECTRON) + 1) / _PER_ELECTRON
     share = distribution.pmf(np.arange(_COUNTS), rows[:, None]) * _COUNTS
     kept, other = np.ones_like(share), np.tile(np.arange(_COUNTS, dtype=np.uint32), (len(rows), 1))

@@ -7,7 +7,7 @@ the first frame's, which hardly hold noise. They are used only where they exceed
 errors, so that a steady burst is left alone and its variance unbiased. A block that still differs afterwards,
 and by enough to count as noise, has moved: it is left out, and where a quarter moved the burst is refused.
 
-Sums count from the first frame, so that they stay small. Memory is 21 bytes per pixel, however many frames.
+Sums count from the first frame, so that they stay small. Memory is 22 bytes per pixel, however many frames.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ SIGNIFICANT = 5.0  # standard errors: of 64 blocks in 1,000 frames none deviates
 LARGEST_FLICKER = 0.1  # of the light; beyond it this is another exposure, and its noise another noise
 MOVED_SHARE = 0.25  # of the blocks, from which on the burst shows no static scene
 CONTAMINATION = 0.1  # of a pixel's noise variance, from which on a changed block spoils the fit
-ZEROS = 0.02  # of the frames; a normal number falls so often below -2
+STUCK = 0.9  # of the frames at 0 or white; what noise carries there less often still tells its variance
 LARGEST_CORRELATION = 0.1  # between the changes of neighbours; noise has none
 _BANDING = 0.1  # of the noise that rows or columns may have in common
 _GRID = 8
@@ -71,7 +71,7 @@ class TemporalStatistics:
         assert self._first is not None
         if dn.shape != self._first.shape:
             raise FsidError(f"{name} of the burst is {dn.shape}, the first one {self._first.shape} (H, W)")
-        self._clipped |= dn >= self._white_level
+        self._whites += dn >= self._white_level
         self._zeros += dn <= 0
         change = dn - self._first.astype(np.float64)
         if self.frames:
@@ -79,7 +79,7 @@ class TemporalStatistics:
             if (gain, offset) != (1.0, 0.0):
                 change += self._first * (1 - gain) - offset
                 change /= gain
-            _check_white(np.where(self._clipped, 0.0, np.sign(change)), name)
+            _check_white(np.where(self._whites, 0.0, np.sign(change)), name)
             if self._dark:
                 self._count_noise(change)
             self.gains.append(gain)
@@ -109,8 +109,14 @@ class TemporalStatistics:
 
     @property
     def clipped_share(self) -> float:
-        """Share of the pixels that touched 0 or white, or moved, in any frame."""
+        """Share of the pixels that are stuck at 0 or white, or moved."""
         return float(self._unusable().mean())
+
+    @property
+    def zero_share(self) -> float:
+        """Share of all values that are 0: noise that was cut off."""
+        self._check()
+        return float(self._zeros.mean()) / self.frames
 
     @property
     def moved_share(self) -> float:
@@ -142,11 +148,15 @@ class TemporalStatistics:
         )
 
     def _unusable(self) -> np.ndarray:
-        """Pixels that touched white once, moved, or touched 0 in more than `ZEROS` of the frames.
+        """Pixels that are stuck at 0 or white, or moved.
 
-        To leave out every pixel that noise once carried down to 0 would keep the quiet ones and bias sigma2.
+        Pixels that touched a limit once are not left out: that would keep the quiet ones and bias sigma2.
         """
-        return self._clipped | (self._zeros > max(1.0, ZEROS * self.frames))
+        stuck = np.maximum(self._zeros, self._whites) > STUCK * self.frames
+        height, width = self._block
+        for row, column in np.argwhere(self._moved):
+            stuck[row * height : (row + 1) * height, column * width : (column + 1) * width] = True
+        return stuck
 
     def _check(self) -> None:
         if self._first is None or self.frames < 2:
@@ -155,8 +165,7 @@ class TemporalStatistics:
     def _start(self, dn: np.ndarray) -> None:
         self._first = dn.astype(np.uint16)
         self._sum, self._squares = np.zeros(dn.shape), np.zeros(dn.shape)
-        self._clipped = np.zeros(dn.shape, bool)
-        self._zeros = np.zeros(dn.shape, np.uint16)
+        self._zeros, self._whites = np.zeros(dn.shape, np.uint16), np.zeros(dn.shape, np.uint16)
         self._noise = np.zeros(4)  # sums over frames: d^2, d^4, variance of row means, of column means
         rows, columns = (max(1, min(_GRID, side // _MIN_BLOCK_SIDE_PX)) for side in dn.shape)
         self._block = dn.shape[0] // rows, dn.shape[1] // columns
@@ -171,7 +180,7 @@ class TemporalStatistics:
 
     def _match(self, change: np.ndarray, name: str) -> tuple[float, float]:
         """(gain, offset) of a frame against the first one; (1, 0) where neither is significant."""
-        usable = ~self._moved & (self._blocks(self._clipped, np.mean) < _MAX_CLIPPED_SHARE)
+        usable = ~self._moved & (self._blocks(self._whites > 0, np.mean) < _MAX_CLIPPED_SHARE)
         means, noise = self._blocks(change, np.mean), np.maximum(self._blocks(change, np.var), 1 / 12)
         if usable.sum() < _MIN_BLOCKS:
             return 1.0, 0.0
@@ -194,9 +203,6 @@ class TemporalStatistics:
                 f"{name}: the scene differs from the first frame's in {100 * self._moved.mean():.0f} % of "
                 f"the image; a burst must show a static scene from a tripod, in steady light"
             )
-        height, width = self._block
-        for row, column in np.argwhere(moved):
-            self._clipped[row * height : (row + 1) * height, column * width : (column + 1) * width] = True
 
     def _count_noise(self, change: np.ndarray) -> None:
         height, width = change.shape
