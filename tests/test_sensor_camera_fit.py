@@ -150,13 +150,37 @@ def test_the_command_meets_the_emva_reference(shared_data, tmp_path, name, k, da
     assert (tmp_path / "p.png").stat().st_size > 10_000
 
 
-def test_read_noise_that_reaches_zero_is_said(tmp_path, rng):
+def test_a_refused_output_leaves_nothing(dng_bursts, tmp_path, capsys):
+    """Both files are checked before the work; neither is written without the other."""
+    folder = tmp_path / "out"
+    folder.mkdir()
+    for profile, plot, named in (
+        ("missing/p.yaml", "fit.png", "p.yaml"),
+        ("p.yaml", "missing/fit.png", "fit.png"),
+        ("p.yaml", "fit.exe", "fit.exe"),
+        (".", "fit.png", "out"),
+    ):
+        with pytest.raises(SystemExit) as caught:
+            main(
+                [
+                    *("calibrate", str(dng_bursts / "light1600"), "-o", str(folder / profile)),
+                    *("--plot", str(folder / plot), "--quiet"),
+                ]
+            )
+        assert caught.value.code == 2
+        assert named in capsys.readouterr().err
+        assert list(folder.iterdir()) == []
+
+
+def test_read_noise_that_reaches_zero_is_said_and_still_found(tmp_path, rng):
     paths = {
         kind: write_burst(tmp_path / kind, rng, scene(light), 12800, 10)
         for kind, light in (("light", 0.9), ("dark", 0.0))
     }
     found = calibrate(paths["light"], name="mine", dark=paths["dark"])
     assert any("reaches DN 0" in note for note in found.notes)
+    np.testing.assert_allclose(found.profile.sigma2[0], PROFILE.level(12800).sigma2, rtol=0.04)
+    np.testing.assert_allclose(found.profile.measured.black, 64, atol=2)
 
 
 def _fails(match, *arguments, **options):

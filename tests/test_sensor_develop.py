@@ -1,10 +1,14 @@
 """Developing: grey is grey, white is white, linear images come back, noise does not move the mean."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from PIL import Image, ImageOps
 
+from fsid.cli.main import main
 from fsid.sensor import (
     CFA_PATTERNS,
     Raw,
@@ -16,10 +20,14 @@ from fsid.sensor import (
     linear_to_camera,
     load_profile,
     mosaic,
+    read_raw,
     srgb_encode,
     unprocess,
+    upright,
+    write_dng,
 )
 from fsid.sensor.colour import published_matrices
+from fsid.sensor.metadata import exposure_metadata
 from fsid.sensor.tone import tone_curve
 
 cfas = pytest.mark.parametrize("cfa", CFA_PATTERNS)
@@ -120,3 +128,22 @@ def test_develop_repeats_itself_and_leaves_its_input_alone():
     np.testing.assert_array_equal(first, develop(raw))
     assert first.dtype == np.float32
     assert first.shape == (16, 16, 3)
+
+
+@pytest.mark.parametrize("orientation", range(1, 9))
+def test_a_picture_is_turned_upright_as_other_programs_do(orientation):
+    stored = np.arange(24, dtype=np.uint8).reshape(4, 6)
+    image = Image.fromarray(stored)
+    image.getexif()[274] = orientation
+    np.testing.assert_array_equal(upright(stored, orientation), np.asarray(ImageOps.exif_transpose(image)))
+
+
+def test_the_command_develops_a_sideways_file_upright(tmp_path):
+    camera = np.random.default_rng(0).random((32, 48, 3), np.float32)
+    raw = _raw(camera, "RGGB", np.eye(3), (2.0, 1.0, 1.5))
+    write_dng(tmp_path / "a.dng", replace(raw, metadata=exposure_metadata(orientation=6)))
+    main(["develop", str(tmp_path / "a.dng"), str(tmp_path / "a.png")])
+    picture = np.asarray(Image.open(tmp_path / "a.png"))
+    assert picture.shape == (48, 32, 3)
+    plain = np.rint(255 * develop(read_raw(tmp_path / "a.dng")))
+    assert np.max(np.abs(picture - np.rot90(plain, -1))) <= 1

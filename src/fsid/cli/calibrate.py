@@ -54,9 +54,14 @@ def calibrate(
             as the frames show them, and switch them on in the profile.
         quiet: No progress bar, no table.
     """
+    from fsid.files import write_atomically
     from fsid.sensor import Layout, save_profile
     from fsid.sensor import calibrate as calibrate_frames
+    from fsid.sensor.fit_plot import calibration_picture, check_folder, check_picture
 
+    check_folder(output)
+    if plot is not None:
+        check_picture(plot)
     layout = Layout(iso, cfa, black_level, white_level, width, height)
     with progress_bar("reading", "frames", quiet=quiet) as progress:
         found = calibrate_frames(
@@ -69,11 +74,10 @@ def calibrate(
             terms=terms,
             progress=progress,
         )
-    if plot is not None:
-        from fsid.sensor.fit_plot import plot_calibration
-
-        plot_calibration(plot, found)
+    picture = calibration_picture(found, plot.suffix) if plot is not None else b""
     save_profile(output, found.profile)
+    if plot is not None:
+        write_atomically(plot, picture)
     for note in found.notes:
         Console(stderr=True, quiet=quiet).print(Text(f"note: {note}"), soft_wrap=True)
     table = Table("ISO", "site", "black (DN)", "k (DN)", "±", "sigma2 (DN²)", "±", title=found.profile.camera)

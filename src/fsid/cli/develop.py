@@ -8,7 +8,7 @@ from tyro.conf import Positional
 
 
 def develop(input: Positional[Path], output: Positional[Path]) -> None:
-    """Develop a RAW file into an sRGB PNG: white balance, demosaic (Malvar et al. 2004), colour matrix.
+    """Develop a RAW file into an upright sRGB PNG: white balance, demosaicing, colour matrix, no tone curve.
 
     Args:
         input: DNG or any other Bayer RAW that LibRaw opens.
@@ -16,7 +16,8 @@ def develop(input: Positional[Path], output: Positional[Path]) -> None:
     """
     from fsid.dataset import check_png, save_png
     from fsid.sensor import develop as develop_raw
-    from fsid.sensor import read_raw
+    from fsid.sensor import read_raw, upright
 
     check_png(output)
-    save_png(output, develop_raw(read_raw(input)))
+    raw = read_raw(input)
+    save_png(output, upright(develop_raw(raw), raw.metadata.orientation))

@@ -18,8 +18,12 @@ def profiles(name: Positional[str | None] = None, *, plot: Path | None = None) -
         name: A built-in profile or a YAML file. All built-in profiles are listed where it is left out.
         plot: Picture of k and sigma2 over ISO to write (.png, .pdf or .svg).
     """
+    from fsid.files import write_atomically
     from fsid.sensor import load_profile, profile_names
+    from fsid.sensor.fit_plot import check_picture, profile_picture
 
+    if plot is not None:
+        check_picture(plot)
     console = Console()
     if name is None:
         if plot is not None:
@@ -47,6 +51,4 @@ def profiles(name: Positional[str | None] = None, *, plot: Path | None = None) -
     console.print(table)
     console.print(profile.source)
     if plot is not None:
-        from fsid.sensor.fit_plot import plot_profile
-
-        plot_profile(plot, profile)
+        write_atomically(plot, profile_picture(profile, plot.suffix))

@@ -7,7 +7,7 @@ from fsid.sensor.camera_fit import Calibration, calibrate
 from fsid.sensor.camera_profile import CameraProfile
 from fsid.sensor.colour import camera_to_srgb_matrix, colour_rand, srgb_to_camera_matrix
 from fsid.sensor.demosaic import demosaic
-from fsid.sensor.develop import develop, develop_linear
+from fsid.sensor.develop import develop, develop_linear, upright
 from fsid.sensor.dng import dng_pixel_offset, read_raw, write_dng
 from fsid.sensor.exposure import expose, exposure_rand
 from fsid.sensor.frames import Layout
@@ -75,6 +75,7 @@ __all__ = [
     "to_dn",
     "unpack",
     "unprocess",
+    "upright",
     "variance",
     "write_dng",
 ]

@@ -17,6 +17,8 @@ from fsid.sensor.mosaic import SITE_CHANNEL, site_offsets
 from fsid.sensor.raw import Raw
 from fsid.sensor.tone import srgb_encode
 
+_TURNED, _UPSIDE_DOWN, _MIRRORED = {5, 6, 7, 8}, {3, 4, 7, 8}, {2, 3, 6, 7}  # orientations
+
 
 def develop(raw: Raw) -> np.ndarray:
     """Picture (H, W, 3) float32, sRGB-encoded 0..1, of a RAW of at least 4x4 pixels. No tone curve."""
@@ -32,3 +34,9 @@ def develop_linear(raw: Raw) -> np.ndarray:
     np.minimum(balanced, 1, out=balanced)
     camera = demosaic(balanced, raw.cfa)
     return apply_matrix(camera_to_srgb_matrix(raw.xyz_to_camera), camera)
+
+
+def upright(picture: np.ndarray, orientation: int) -> np.ndarray:
+    """A picture (H, W, ...) as it is to be looked at; orientation: 1..8 of TIFF 6.0, else as it is."""
+    turned = picture.swapaxes(0, 1) if orientation in _TURNED else picture
+    return turned[:: -1 if orientation in _UPSIDE_DOWN else 1, :: -1 if orientation in _MIRRORED else 1]

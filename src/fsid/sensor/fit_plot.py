@@ -7,6 +7,7 @@ last column shows k and sigma2 over ISO with the profile's law, where there are 
 
 from __future__ import annotations
 
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -20,11 +21,25 @@ from fsid.sensor.camera_profile import MONO, CameraProfile
 from fsid.sensor.mosaic import SITES
 
 COLOURS = ("tab:red", "tab:green", "tab:olive", "tab:blue")
+PICTURES = (".png", ".pdf", ".svg")
 _MAX_COLUMNS = 4  # ISOs in one picture; of more, evenly chosen ones
 
 
-def plot_calibration(path: Path, calibration: Calibration) -> None:
-    """Write the picture to `path` (.png, .pdf or .svg)."""
+def check_picture(path: Path) -> None:
+    """FsidError unless a picture can be written to `path`: before the work of which it is made."""
+    if path.suffix.lower() not in PICTURES:
+        raise FsidError(f"{path}: a plot is written as {', '.join(PICTURES)}")
+    check_folder(path)
+
+
+def check_folder(path: Path) -> None:
+    """FsidError unless the folder of `path` is there and `path` is no folder."""
+    if not path.parent.is_dir() or path.is_dir():
+        raise FsidError(f"{path}: cannot be written; its folder must be there, and it must be no folder")
+
+
+def calibration_picture(calibration: Calibration, suffix: str) -> bytes:
+    """The picture as a file of the kind `suffix`, one of `PICTURES`."""
     profile, fits = calibration.profile, calibration.fits
     chosen = np.unique(np.linspace(0, len(fits) - 1, min(len(fits), _MAX_COLUMNS)).round().astype(int))
     laws = len(fits) > 1
@@ -35,16 +50,16 @@ def plot_calibration(path: Path, calibration: Calibration) -> None:
     if laws:
         plot_levels(axes[0, -1], axes[1, -1], profile)
     figure.suptitle(f"{profile.camera}: Var = k (DN - black) + sigma2")
-    save_figure(path, figure)
+    return _file(figure, suffix)
 
 
-def plot_profile(path: Path, profile: CameraProfile) -> None:
-    """Write the picture of k and sigma2 over ISO to `path` (.png, .pdf or .svg)."""
+def profile_picture(profile: CameraProfile, suffix: str) -> bytes:
+    """The picture of k and sigma2 over ISO as a file of the kind `suffix`, one of `PICTURES`."""
     figure = Figure(figsize=(11, 4.5), layout="constrained")
     left, right = figure.subplots(1, 2)
     plot_levels(left, right, profile)
     figure.suptitle(profile.camera)
-    save_figure(path, figure)
+    return _file(figure, suffix)
 
 
 def plot_levels(k_axes: Axes, sigma2_axes: Axes, profile: CameraProfile) -> None:
@@ -69,13 +84,10 @@ def plot_levels(k_axes: Axes, sigma2_axes: Axes, profile: CameraProfile) -> None
         axes.grid(alpha=0.3)
 
 
-def save_figure(path: Path, figure: Figure) -> None:
-    """Write `figure`; FsidError where the folder is not there or the suffix is no picture's."""
-    try:
-        figure.savefig(path, dpi=110)
-    except (OSError, ValueError) as error:
-        path.unlink(missing_ok=True)
-        raise FsidError(f"{path}: cannot write this plot: {error}") from error
+def _file(figure: Figure, suffix: str) -> bytes:
+    buffer = BytesIO()
+    figure.savefig(buffer, dpi=110, format=suffix.lower().removeprefix("."))
+    return buffer.getvalue()
 
 
 def _plot_fit(top: Axes, bottom: Axes, fit: NoiseFit, profile: CameraProfile, iso: float) -> None:

@@ -42,6 +42,12 @@ class Metadata:
     mosaic: tuple[Tag, ...] = ()
     exif: tuple[Tag, ...] = ()
 
+    @property
+    def orientation(self) -> int:
+        """How the picture is to be turned, 1..8 of TIFF 6.0; 1 where nothing is said."""
+        values = next((tag.values for tag in self.first if tag.code == ORIENTATION), ())
+        return int(values[0]) if len(values) and not isinstance(values, bytes) else 1
+
     def without_geometry(self) -> Metadata:
         """The same for an image that was cropped or mirrored: crop and lens corrections are off."""
         return Metadata(self.first, tuple(t for t in self.mosaic if t.code not in _GEOMETRY), self.exif)
