@@ -19,7 +19,9 @@ from fsid.sensor import (
     noisy_from_clean,
     save_profile,
     to_dn,
+    write_dng,
 )
+from fsid.sensor.metadata import exposure_metadata
 from fsid.sensor.poisson import poisson
 
 LEVEL = NoiseLevel(k=(2e-3, 2e-3, 2e-3, 2e-3), sigma2=(4e-5, 4e-5, 4e-5, 4e-5))
@@ -180,3 +182,41 @@ def test_calibration_finds_the_terms_again(tmp_path):
         assert getattr(measured, name) == pytest.approx(getattr(terms, name), rel=rtol), name
     assert 0.3 < measured.tail < 1.1  # of the sum with rows, columns and rounding, which are Gaussian
     np.testing.assert_allclose(found.profile.sigma2[0], 1e-4, rtol=0.05)
+
+
+def test_calibration_finds_dark_current_and_drift_again(tmp_path, rng):
+    """Dark frames of two exposure times; the black level wanders by half the read noise."""
+    terms, level = NoiseTerms(drift=0.5, dark_current_e_s=10.0), NoiseLevel(LEVEL.k, (1e-4,) * 4)
+    ramp = flat(0.0, 96)
+    ramp.mosaic[:] = np.linspace(0, 0.8, 96, dtype=np.float32)
+    groups = {"light": (ramp, 0.02), "short": (flat(0.0, 96), 0.02), "long": (flat(0.0, 96), 2.0)}
+    for name, (clean, exposure_s) in groups.items():
+        (tmp_path / name).mkdir()
+        stated = replace(clean, metadata=exposure_metadata(exposure_s), camera="Maker Model")
+        for number in range(60):
+            noisy = noisy_from_clean(rng, stated, 800, level, terms, exposure_s=exposure_s)
+            write_dng(tmp_path / name / f"{number:03d}.dng", noisy)
+    found = calibrate(
+        [tmp_path / "light"], name="p", dark=[tmp_path / "short", tmp_path / "long"], terms=True
+    )
+    measured = found.profile.terms
+    assert measured.dark_current_e_s == pytest.approx(10.0, rel=0.05)
+    assert measured.drift == pytest.approx(0.5, rel=0.3)
+    assert any("drifted" in note for note in found.notes)
+    np.testing.assert_allclose(found.profile.k[0], level.k, rtol=0.03)
+    np.testing.assert_allclose(found.profile.sigma2[0], level.sigma2, rtol=0.03)
+    assert (measured.row, measured.column, measured.poisson) == (0.0, 0.0, False)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_camera_without_them_gets_no_terms(seed, tmp_path):
+    rng = np.random.default_rng(seed)
+    for kind, x in (("light", 0.5), ("dark", 0.0)):
+        (tmp_path / kind).mkdir()
+        for number in range(20):
+            noisy = noisy_from_clean(rng, flat(x, 96), 800, LEVEL)
+            np.save(tmp_path / kind / f"{number:03d}.npy", to_dn(noisy))
+    layout = Layout(iso=800, cfa="RGGB", white_level=1023)
+    found = calibrate([tmp_path / "light"], name="p", dark=[tmp_path / "dark"], layout=layout, terms=True)
+    assert replace(found.profile.terms, prnu=0.0) == NoiseTerms()
+    assert found.profile.terms.prnu < 0.003
