@@ -22,7 +22,14 @@ from fsid.errors import FsidError
 
 KILLS = 50
 COUNT, SHARD = 96, 4
-SCENES = ["scene.objects=[1,2]", "texture_size=64", "supersampling=1", "width=64", "height=48"]
+SCENES = [
+    "scene.objects=[1,2]",
+    "scene.material_families=[brick,paint]",
+    "texture_size=64",
+    "supersampling=1",
+    "width=64",
+    "height=48",
+]
 
 SCRIPT = """
 import sys

@@ -1,26 +1,31 @@
 """Samples, shards on disk, and training patches from them."""
 
-from fsid.dataset.config import GenerateConfig
-from fsid.dataset.generate import DatasetConfig, generate
+from fsid.dataset.attempt import Sample, sample_key
+from fsid.dataset.config import GenerateConfig, generate_config
+from fsid.dataset.generate import DatasetConfig, Workforce, generate
 from fsid.dataset.photos import find_photos, read_photo
 from fsid.dataset.picture import check_png, contact_sheet, grid, save_png
-from fsid.dataset.sample import Sample, encode, make_sample, sample_key, scene_of, to_uint8
+from fsid.dataset.sample import encode, make_frame, make_sample, remake, scene_of, to_uint8
 from fsid.dataset.shards import find_shards, read_member, shard_keys, shard_path, write_shard
 
 __all__ = [
     "DatasetConfig",
     "GenerateConfig",
     "Sample",
+    "Workforce",
     "check_png",
     "contact_sheet",
     "encode",
     "find_photos",
     "find_shards",
     "generate",
+    "generate_config",
     "grid",
+    "make_frame",
     "make_sample",
     "read_member",
     "read_photo",
+    "remake",
     "sample_key",
     "save_png",
     "scene_of",

@@ -6,31 +6,76 @@ not change a sample.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from importlib.resources import as_file, files
+from pathlib import Path
 
+from fsid.config import load_settings
 from fsid.errors import FsidError
 from fsid.scene import VARIANTS, SceneConfig
+
+TASKS = ("denoise", "super-resolution")
+_POSITIVE = ("crops", "exposures", "noise_levels")
+_MAX_FRAMES = 32
+
+
+@dataclass(frozen=True)
+class Checks:
+    """What a sample must be; one that is not is drawn again, scene and all.
+
+    black_share, blown_share: largest share of a clean image that may be darker than 1/1000 of saturation, or
+    whose green is saturated; 0..1. duplicate_bits: two images are near-duplicates where at most so many of
+    the 256 bits of their fingerprints differ; -1 looks for none. Pictures are not compared: the same one
+    comes back on purpose where a dataset has more frames than its folder has pictures.
+    """
+
+    black_share: float = 0.5
+    blown_share: float = 0.25
+    duplicate_bits: int = 8
+
+    def __post_init__(self) -> None:
+        for key in ("black_share", "blown_share"):
+            if not 0 <= getattr(self, key) <= 1:
+                raise FsidError(f"checks.{key}: {getattr(self, key)} is not between 0 and 1")
+        if not -1 <= self.duplicate_bits <= 256:
+            raise FsidError(f"checks.duplicate_bits: {self.duplicate_bits} is not between -1 and 256")
 
 
 @dataclass(frozen=True)
 class GenerateConfig:
     """Settings of `fsid generate`; `width` and `height` in pixels, even (the CFA is 2x2).
 
-    cameras: noise profiles, built-in names or files; each sample draws one.
+    task: one of TASKS, see `tasks`. scale: of super-resolution, 2 or 4. frames: of a burst.
+    cameras: noise profiles, built-in names or files; each exposure draws one.
     iso_range: lowest and highest ISO, drawn log-uniformly.
+    crops, exposures, noise_levels: how many of each a frame gives; it gives their product of pairs. All crops
+    of a frame share its exposures (camera, colour, brightness), and each pair has noise of its own.
+    crop_width, crop_height: pixels; 0 takes the whole frame.
+    validation_every: every so-manieth scene (or photograph) is for validation, all its pairs; 0: none.
     supersampling: edge of the grid of samples per pixel. texture_size: pixels per
     edge of a baked material, a power of two; 0 follows the width (see `texture_px`).
-    images: a folder of photographs to use instead of scenes ("" renders scenes).
+    images: a folder of photographs or linear .exr renders to use instead of scenes ("" renders scenes).
     """
 
     width: int = 1920
     height: int = 1080
     variant: str = "full"
+    task: str = "denoise"
+    scale: int = 2
+    frames: int = 5
     cameras: tuple[str, ...] = ("pixel6", "galaxy-s22")
     iso_range: tuple[float, float] = (400.0, 8000.0)
+    crops: int = 1
+    crop_width: int = 0
+    crop_height: int = 0
+    exposures: int = 1
+    noise_levels: int = 1
+    validation_every: int = 0
     supersampling: int = 2
     texture_size: int = 0
     images: str = ""
+    checks: Checks = field(default_factory=Checks)
     scene: SceneConfig = field(default_factory=SceneConfig)
 
     def __post_init__(self) -> None:
@@ -38,19 +83,51 @@ class GenerateConfig:
             size = getattr(self, key)
             if size < 32 or size % 2:
                 raise FsidError(f"{key}: {size} is not an even number of at least 32 pixels")
-        if self.variant not in VARIANTS:
-            raise FsidError(f"variant: {self.variant!r} is not one of {', '.join(VARIANTS)}")
+            self._check_crop(f"crop_{key}", size)
+        for key, known in (("variant", VARIANTS), ("task", TASKS)):
+            if getattr(self, key) not in known:
+                raise FsidError(f"{key}: {getattr(self, key)!r} is not one of {', '.join(known)}")
         low, high = self.iso_range
         if not 0 < low <= high:
             raise FsidError(f"iso_range: [{low}, {high}] must be two positive numbers, the lower first")
         if not self.cameras:
             raise FsidError("cameras: at least one noise profile is needed")
+        for key in _POSITIVE:
+            if getattr(self, key) < 1:
+                raise FsidError(f"{key}: {getattr(self, key)} is not a whole number of at least 1")
+        if self.validation_every < 0:
+            raise FsidError(f"validation_every: {self.validation_every} is negative; 0 means no validation")
+        if self.scale not in (2, 4):
+            raise FsidError(f"scale: {self.scale} is neither 2 nor 4")
+        if not 2 <= self.frames <= _MAX_FRAMES:
+            raise FsidError(f"frames: {self.frames} is not between 2 and {_MAX_FRAMES}")
         if not 1 <= self.supersampling <= 4:
             raise FsidError(f"supersampling: {self.supersampling} is not between 1 and 4")
         if self.texture_size and (not 64 <= self.texture_size <= 4096 or self.texture_size.bit_count() != 1):
             raise FsidError(f"texture_size: {self.texture_size} is not 0 or a power of two from 64 to 4096")
 
+    def _check_crop(self, key: str, frame: int) -> None:
+        size = getattr(self, key)
+        if size and not (32 <= size <= frame and size % 2 == 0):
+            raise FsidError(
+                f"{key}: {size} is not 0 or an even number of pixels from 32 to the frame's {frame}"
+            )
+
     @property
     def texture_px(self) -> int:
         """`texture_size`, or its default: the power of two at or above half the width, 128 to 1024."""
         return self.texture_size or 1 << min(max((self.width // 2 - 1).bit_length(), 7), 10)
+
+    @property
+    def pairs_per_frame(self) -> int:
+        """How many pairs one rendered frame, or one photograph, gives."""
+        return self.crops * self.exposures * self.noise_levels
+
+
+def generate_config(name_or_file: str | Path | None, overrides: Sequence[str] = ()) -> GenerateConfig:
+    """A built-in configuration by name (`fsid/configs`), or a YAML file; `key=value` overrides on top."""
+    builtin = files("fsid.configs").joinpath(f"{name_or_file}.yaml")
+    if name_or_file is None or not builtin.is_file():
+        return load_settings(GenerateConfig, None if name_or_file is None else Path(name_or_file), overrides)
+    with as_file(builtin) as file:
+        return load_settings(GenerateConfig, file, overrides)

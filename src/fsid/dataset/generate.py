@@ -16,12 +16,13 @@ from pathlib import Path
 
 from fsid.config import from_plain, read_yaml, save_settings, to_plain
 from fsid.dataset.config import GenerateConfig
-from fsid.dataset.crew import Crew, LocalCrew, MakeWork, run
-from fsid.dataset.photos import find_photos
-from fsid.dataset.sample import encode, make_sample, sample_key
+from fsid.dataset.crew import Crew, LocalCrew, run
+from fsid.dataset.pictures import find_pictures
+from fsid.dataset.sample import encode, make_frame
+from fsid.dataset.settle import Settle, settle
 from fsid.dataset.shards import remove_parts, shard_keys, shard_path, write_shard
+from fsid.dataset.worker import Worker
 from fsid.errors import FsidError
-from fsid.render import Renderer
 from fsid.sensor import load_profile
 
 SHARD_SIZE = 16
@@ -31,11 +32,15 @@ SAMPLES_PER_WORKER = 320
 
 @dataclass(frozen=True)
 class DatasetConfig:
-    """What `config.yaml` beside the shards says: the identity of the dataset."""
+    """What `config.yaml` beside the shards says: the identity of the dataset.
+
+    pictures: how many there are in the folder `generate.images`; 0 for scenes.
+    """
 
     seed: int
     shard_size: int
     generate: GenerateConfig
+    pictures: int = 0
 
 
 @dataclass(frozen=True)
@@ -54,13 +59,13 @@ class Workforce:
         if self.workers < 1 or self.workers_per_gpu < 0:
             raise FsidError("--workers must be at least 1, --workers-per-gpu at least 0")
 
-    def crew(self, make_work: MakeWork) -> Crew:
+    def crew(self) -> Crew:
         """The workers, none of them started."""
         if not self.ray:
-            return LocalCrew(self.workers, make_work, self.workers_per_gpu)
+            return LocalCrew(self.workers, Worker, self.workers_per_gpu)
         from fsid.dataset.ray_crew import RayCrew
 
-        return RayCrew(self.ray, self.workers, make_work, self.workers_per_gpu)
+        return RayCrew(self.ray, self.workers, Worker, self.workers_per_gpu)
 
 
 @dataclass(frozen=True)
@@ -72,6 +77,19 @@ class _Shard:
     def __str__(self) -> str:
         return self.path.name
 
+    def do(self, worker: Worker) -> int:
+        """Write the shard; number of its samples."""
+        write_shard(self.path, self._samples(worker))
+        return len(self.indices)
+
+    def _samples(self, worker: Worker) -> Iterator[tuple[str, dict[str, bytes]]]:
+        config = self.dataset.generate
+        first, last = (index // config.pairs_per_frame for index in (self.indices[0], self.indices[-1]))
+        for frame in range(first, last + 1):
+            for sample in make_frame(config, self.dataset.seed, frame, worker.renderer(config)):
+                if sample.record["index"] in self.indices:
+                    yield sample.key, encode(sample)
+
 
 def generate(
     out: Path,
@@ -80,51 +98,53 @@ def generate(
     count: int,
     seed: int = 0,
     workers: int = 1,
-    shard_size: int = SHARD_SIZE,
+    shard_size: int = 0,
     progress: Callable[[int, int], None] = lambda done, total: None,
     workforce: Workforce | None = None,
     lost: Callable[[str], None] = lambda line: None,
 ) -> int:
     """Make the samples 0 .. count-1 that `out` lacks; returns how many were made.
 
-    workers: short for Workforce(workers). progress(done, total): samples, called at the start and after every
+    workers: short for Workforce(workers). shard_size: samples, a multiple of `config.pairs_per_frame`; 0
+    takes the first from SHARD_SIZE on. progress(done, total): samples, called at the start and after every
     shard. lost(line): called for every worker that died; its shard is made again by another.
     Raises FsidError where `out` already holds a dataset of another configuration or seed, where another
     process fills it, where the disk refuses, or where a shard kills its worker again and again.
     """
-    if count < 1 or shard_size < 1:
-        raise FsidError("--count and the shard size must be at least 1")
+    if count < 1:
+        raise FsidError(f"--count {count}: must be at least 1")
     workforce = workforce or Workforce(workers)
-    for camera in config.cameras:
-        load_profile(camera)
-    if config.images:
-        find_photos(Path(config.images))
-    dataset = DatasetConfig(seed, shard_size, config)
+    dataset = dataset_config(config, seed, shard_size)
     with _locked(out):
         _claim(out, dataset)
         todo = list(_missing(out, dataset, count))
         total = sum(len(shard.indices) for shard in todo)
         done = count - total
         progress(done, count)
-        for made in _make_shards(out, todo, workforce, lost):
-            done += made
-            progress(done, count)
+        tasks_per_worker = max(1, SAMPLES_PER_WORKER // dataset.shard_size)
+        if todo:
+            for _, made in run(workforce.crew(), todo, tasks_per_worker=tasks_per_worker, lost=lost):
+                done += made
+                progress(done, count)
+        shards = [shard_path(out, number) for number in range(-(-count // dataset.shard_size))]
+
+        def redraw(task: Settle) -> None:
+            list(run(workforce.crew(), [task], tasks_per_worker=1, lost=lost))
+
+        settle(shards, config, seed, redraw)
     return total
 
 
-def _make_shards(
-    out: Path, todo: list[_Shard], workforce: Workforce, lost: Callable[[str], None]
-) -> Iterator[int]:
-    """Number of samples of each shard as it is finished; half-written ones are removed when stopped."""
-    if not todo:
-        return
-    crew = workforce.crew(_ShardMaker)
-    tasks_per_worker = max(1, SAMPLES_PER_WORKER // len(todo[0].indices))
-    try:
-        for _, made in run(crew, todo, tasks_per_worker=tasks_per_worker, lost=lost):
-            yield made
-    finally:
-        remove_parts(out)
+def dataset_config(config: GenerateConfig, seed: int, shard_size: int = 0) -> DatasetConfig:
+    """The identity of the dataset of (config, seed); FsidError where what it names does not exist."""
+    for camera in config.cameras:
+        load_profile(camera)
+    pictures = len(find_pictures(Path(config.images))) if config.images else 0
+    pairs = config.pairs_per_frame
+    shard_size = shard_size or -(-SHARD_SIZE // pairs) * pairs
+    if shard_size < 1 or shard_size % pairs:
+        raise FsidError(f"shard size {shard_size}: is not a multiple of the {pairs} pairs of a frame")
+    return DatasetConfig(seed, shard_size, config, pictures)
 
 
 @contextmanager
@@ -145,6 +165,7 @@ def _locked(out: Path) -> Iterator[None]:
         remove_parts(out)
         yield
     finally:
+        remove_parts(out)
         os.close(folder)
 
 
@@ -178,32 +199,3 @@ def _missing(out: Path, dataset: DatasetConfig, count: int) -> Iterator[_Shard]:
         path = shard_path(out, number)
         if not path.exists() or len(shard_keys(path)) < len(indices):
             yield _Shard(path, indices, dataset)
-
-
-class _ShardMaker:
-    """Makes shards in a worker; owns its renderer, which opens when the first scene needs it."""
-
-    def __init__(self, gpu: int | None) -> None:
-        self._gpu = gpu
-        self._renderer: Renderer | None = None
-
-    def __call__(self, shard: _Shard) -> int:
-        config = shard.dataset.generate
-        renderer = None if config.images else self._open(config)
-        write_shard(
-            shard.path,
-            (
-                (sample_key(i), encode(make_sample(config, shard.dataset.seed, i, renderer)))
-                for i in shard.indices
-            ),
-        )
-        return len(shard.indices)
-
-    def _open(self, config: GenerateConfig) -> Renderer:
-        if self._renderer is None:
-            self._renderer = Renderer(
-                device_index=self._gpu,
-                supersampling=config.supersampling,
-                texture_size=config.texture_px,
-            )
-        return self._renderer

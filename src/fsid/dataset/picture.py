@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -46,6 +47,7 @@ def contact_sheet(
     """The clean images of samples 0 .. count-1, developed, in a grid: (H, W, 3) uint8 sRGB."""
     if count < 1:
         raise FsidError(f"--count {count}: at least one scene is needed")
+    config = replace(config, crops=1, crop_width=0, crop_height=0, exposures=1, noise_levels=1)
     tiles = []
     with Renderer(supersampling=config.supersampling, texture_size=config.texture_px) as renderer:
         for i in range(count):

@@ -8,12 +8,14 @@ constant (time 0, owner 0), so equal samples give equal shards, and of two write
 from __future__ import annotations
 
 import io
+import json
 import os
 import socket
 import tarfile
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from fsid.errors import FsidError
 
@@ -83,6 +85,35 @@ def read_member(path: Path, name: str) -> bytes:
             return file.read()
     except (OSError, tarfile.TarError, KeyError):
         raise FsidError(f"{path}: has no readable member {name}") from None
+
+
+def read_samples(path: Path) -> dict[str, dict[str, bytes]]:
+    """All samples of a shard by key, and their files by extension. FsidError where it is not readable."""
+    samples: dict[str, dict[str, bytes]] = {}
+    for name, data in _read(path, lambda name: True):
+        key, _, extension = name.partition(".")
+        samples.setdefault(key, {})[extension] = data
+    return samples
+
+
+def read_records(path: Path) -> Iterator[dict[str, Any]]:
+    """The content of the JSON of every sample of a shard. FsidError where it is not readable."""
+    for name, data in _read(path, lambda name: name.endswith(".json")):
+        try:
+            yield json.loads(data)
+        except ValueError as error:
+            raise FsidError(f"{path}: {name} is not JSON ({error}); delete it and generate again") from None
+
+
+def _read(path: Path, wanted: Callable[[str], bool]) -> Iterator[tuple[str, bytes]]:
+    try:
+        with tarfile.open(path, "r:") as tar:
+            for member in tar:
+                file = tar.extractfile(member) if wanted(member.name) else None
+                if file is not None:
+                    yield member.name, file.read()
+    except (OSError, tarfile.TarError) as error:
+        raise FsidError(f"{path}: is not a readable shard ({error}); delete it and generate again") from None
 
 
 def _members(path: Path) -> list[str]:

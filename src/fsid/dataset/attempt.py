@@ -1,0 +1,243 @@
+"""One attempt at all samples of a frame.
+
+    light (scene or picture) -> views (truth, what is seen) -> crops x exposures -> clean -> noise levels
+
+Every draw has a random stream of its own, addressed by (frame, attempt, what is drawn, which of them).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from fsid import __version__
+from fsid.config import to_plain
+from fsid.dataset.checks import distance, fingerprint, flaw
+from fsid.dataset.config import GenerateConfig
+from fsid.dataset.pictures import find_pictures, read_picture
+from fsid.dataset.tasks import Views, smaller
+from fsid.errors import FsidError
+from fsid.render import Frame
+from fsid.scene import Scene
+from fsid.scene import sample as sample_scene
+from fsid.sensor import (
+    CameraProfile,
+    Raw,
+    clean_from_linear,
+    clean_from_photo,
+    exposure_rand,
+    level_rand,
+    load_profile,
+    noisy_from_clean,
+)
+
+_SCENE, _CROP, _EXPOSURE, _COLOUR, _NOISE, _TASK = range(6)
+Window = tuple[int, int, int, int]
+"""Left, top, width, height in pixels of the truth."""
+
+
+class SceneRenderer(Protocol):
+    """Anything that turns a scene into a frame."""
+
+    def render(self, scene: Scene, camera_index: int = 0) -> Frame: ...
+
+
+@dataclass(frozen=True)
+class Sample:
+    """A pair and its record. `record` is plain data (JSON).
+
+    more: what a task adds, by the name of its file: `degraded`, the noise-free image behind `noisy` where
+    that is not `clean`.
+    """
+
+    key: str
+    clean: Raw
+    noisy: Raw
+    record: dict[str, Any]
+    more: dict[str, Raw] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """refused: why the earlier attempts were. scene: where it is known already; else it is drawn."""
+
+    config: GenerateConfig
+    seed: int
+    frame: int
+    refused: tuple[str, ...] = ()
+    scene: Scene | None = None
+
+    def samples(self, renderer: SceneRenderer | None) -> list[Sample] | str:
+        """All samples of the frame, or what is wrong with it."""
+        light = self._light(renderer)
+        if not np.isfinite(light.image).all():
+            return "not finite"
+        views = self._views(light)
+        shots = [self._shot(views, light, number) for number in range(self.config.exposures)]
+        samples: list[Sample] = []
+        looks: list[str] = []
+        for crop in range(self.config.crops):
+            window = self._window(views, crop)
+            clean = [shot.clean(_cut(views.truth, window)) for shot in shots]
+            if wrong := next(filter(None, (flaw(raw, self.config.checks) for raw in clean)), None):
+                return wrong
+            looks.append(fingerprint(clean[0]))
+            if not self.config.images and self._is_old(looks):
+                return "near-duplicate"
+            facts = {"window": list(window), "fingerprint": looks[-1], **views.facts, **light.facts}
+            for exposure, shot in enumerate(shots):
+                inputs = [
+                    clean[exposure] if image is views.truth else shot.clean(_cut(image, window, views.scale))
+                    for image in views.seen
+                ]
+                samples += self._pairs((crop, exposure), shot, clean[exposure], inputs, facts)
+        return samples
+
+    def drawn_scene(self) -> Scene:
+        """The scene that this attempt renders."""
+        if self.scene is not None:
+            return self.scene
+        config = self.config
+        seed = int(self._stream(_SCENE).generate_state(1, np.uint64)[0] >> np.uint64(1))
+        return sample_scene(
+            config.scene, seed, width=config.width, height=config.height, variant=config.variant
+        )
+
+    def _is_old(self, looks: list[str]) -> bool:
+        near = self.config.checks.duplicate_bits
+        return any(distance(looks[-1], other) <= near for other in looks[:-1])
+
+    def _light(self, renderer: SceneRenderer | None) -> _Light:
+        if not self.config.images:
+            if renderer is None:
+                raise ValueError("a renderer is needed to make samples from scenes")
+            scene = self.drawn_scene()
+            facts = {"split": split_of(self.config, self.frame), "scene": to_plain(scene)}
+            return _Light(renderer.render(scene).radiance, facts, is_linear=True)
+        paths = find_pictures(Path(self.config.images))
+        number = self.frame % len(paths)
+        picture = read_picture(paths[number])
+        window = _window_rand(
+            self._rng(_SCENE), picture.pixels, self.config.width, self.config.height, step=2
+        )
+        facts = {"split": split_of(self.config, number), "image": picture.path.name}
+        return _Light(_cut(picture.pixels, window), facts, picture.is_linear)
+
+    def _views(self, light: _Light) -> Views:
+        if self.config.task == "super-resolution":
+            if not light.is_linear:
+                raise FsidError(
+                    "--task super-resolution: needs scenes or linear .exr pictures, not photographs"
+                )
+            return smaller(self._rng(_TASK), light.image, self.config.scale)
+        return Views(light.image, (light.image,))
+
+    def _shot(self, views: Views, light: _Light, number: int) -> _Shot:
+        rng = self._rng(_EXPOSURE, number)
+        profile = load_profile(self.config.cameras[rng.integers(len(self.config.cameras))])
+        gain = exposure_rand(rng, views.truth) if light.is_linear else None
+        return _Shot(profile, gain, self._stream(_COLOUR, number))
+
+    def _window(self, views: Views, number: int) -> Window:
+        width, height = self.config.crop_width, self.config.crop_height
+        rng = self._rng(_CROP, number)
+        return _window_rand(rng, views.truth, width or None, height or None, step=2 * views.scale)
+
+    def _pairs(
+        self, place: tuple[int, int], shot: _Shot, clean: Raw, inputs: list[Raw], facts: dict[str, Any]
+    ) -> Iterator[Sample]:
+        """One sample per noise level of a crop and exposure."""
+        config, profile = self.config, shot.profile
+        crop, exposure = place
+        for number in range(config.noise_levels):
+            rng = self._rng(_NOISE, crop, exposure, number)
+            iso, level = level_rand(rng, profile, config.iso_range)
+            noisy, *_ = (noisy_from_clean(rng, raw, iso, level, profile.terms) for raw in inputs)
+            index = (
+                (self.frame * config.crops + crop) * config.exposures + exposure
+            ) * config.noise_levels + number
+            record = {
+                "key": sample_key(index),
+                "fsid_version": __version__,
+                "task": config.task,
+                "seed": self.seed,
+                "index": index,
+                "frame": self.frame,
+                "refused": list(self.refused),
+                "profile": profile.name,
+                "camera": profile.camera,
+                "cfa": clean.cfa,
+                "black_level": noisy.black_level,
+                "white_level": noisy.white_level,
+                "white_balance": list(clean.white_balance),
+                "xyz_to_camera": np.asarray(clean.xyz_to_camera).tolist(),
+                "iso": iso,
+                "k": list(level.k),
+                "sigma2": list(level.sigma2),
+                **facts,
+                "settings": to_plain(config),
+            }
+            more = {} if inputs[0] is clean else {"degraded": inputs[0]}
+            yield Sample(sample_key(index), clean, noisy, record, more)
+
+    def _stream(self, *place: int) -> np.random.SeedSequence:
+        return np.random.SeedSequence(self.seed, spawn_key=(self.frame, len(self.refused), *place))
+
+    def _rng(self, *place: int) -> np.random.Generator:
+        return np.random.default_rng(self._stream(*place))
+
+
+@dataclass(frozen=True)
+class _Light:
+    """What a frame is made of: (H, W, 3), from a scene or a picture, and where it is from."""
+
+    image: np.ndarray
+    facts: dict[str, Any]
+    is_linear: bool
+
+
+@dataclass(frozen=True)
+class _Shot:
+    """One exposure of a frame: camera, brightness and colour. gain: None for photographs."""
+
+    profile: CameraProfile
+    gain: float | None
+    colour: np.random.SeedSequence
+
+    def clean(self, image: np.ndarray) -> Raw:
+        """The RAW of `image` (H, W, 3); the same colour for every image of the shot."""
+        rng = np.random.default_rng(self.colour)
+        if self.gain is None:
+            return clean_from_photo(rng, image, self.profile)
+        return clean_from_linear(rng, image * np.float32(self.gain), self.profile)
+
+
+def sample_key(index: int) -> str:
+    """The name of sample `index` inside the shards."""
+    return f"{index:08d}"
+
+
+def split_of(config: GenerateConfig, number: int) -> str:
+    """ "train" or "validation": where scene or picture `number` belongs with all its samples."""
+    every = config.validation_every
+    return "validation" if every and number % every == every - 1 else "train"
+
+
+def _window_rand(
+    rng: np.random.Generator, image: np.ndarray, width: int | None, height: int | None, step: int
+) -> Window:
+    """A random window of at most width x height (None: all there is), all its numbers multiples of `step`."""
+    rows, columns = image.shape[:2]
+    height = min(height or rows, rows) // step * step
+    width = min(width or columns, columns) // step * step
+    top, left = (int(rng.integers(free // step + 1)) * step for free in (rows - height, columns - width))
+    return left, top, width, height
+
+
+def _cut(image: np.ndarray, window: Window, scale: int = 1) -> np.ndarray:
+    left, top, width, height = (value // scale for value in window)
+    return image[top : top + height, left : left + width]

@@ -1,0 +1,78 @@
+"""Pictures as the source of clean images instead of scenes: photographs, or linear renders of any engine.
+
+A photograph is unprocessed (Brooks et al. 2019). An OpenEXR file holds light, linear and unbounded, and goes
+the way of a rendered frame: exposed, seen by the camera, and no curve is inverted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from fsid.dataset.photos import PHOTO_SUFFIXES, read_photo
+from fsid.errors import FsidError
+
+EXR_SUFFIX = ".exr"
+_SRGB_CHROMATICITIES = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
+_SMALLEST_PX = 32
+
+
+@dataclass(frozen=True)
+class Picture:
+    """pixels: (H, W, 3) float32, H and W even; linear light where `is_linear`, else sRGB-encoded 0..1."""
+
+    path: Path
+    pixels: np.ndarray
+    is_linear: bool
+
+
+def find_pictures(folder: Path) -> list[Path]:
+    """The photographs and .exr files directly inside `folder`, by name; FsidError where there is none."""
+    if not folder.is_dir():
+        raise FsidError(f"{folder}: is not a folder of photographs or .exr renders")
+    suffixes = (*PHOTO_SUFFIXES, EXR_SUFFIX)
+    pictures = sorted(path for path in folder.iterdir() if path.suffix.lower() in suffixes)
+    if not pictures:
+        raise FsidError(f"{folder}: holds no picture ({', '.join(suffixes)})")
+    return pictures
+
+
+def read_picture(path: Path) -> Picture:
+    """A photograph or a render, upright, cropped to even size; FsidError where it is unreadable."""
+    if path.suffix.lower() == EXR_SUFFIX:
+        return Picture(path, read_exr(path), is_linear=True)
+    return Picture(path, read_photo(path), is_linear=False)
+
+
+def read_exr(path: Path) -> np.ndarray:
+    """(H, W, 3) float32 linear sRGB light >= 0 of the channels R, G, B (or Y) of the first part, even size.
+
+    Negative values, which renderers' filters leave, become 0. FsidError: unreadable, no such channels, other
+    primaries than those of sRGB, NaN or infinity.
+    """
+    import OpenEXR
+
+    try:
+        with OpenEXR.File(str(path), separate_channels=True) as file:
+            channels = {name: np.asarray(c.pixels, np.float32) for name, c in file.channels().items()}
+            chromaticities = file.header().get("chromaticities", _SRGB_CHROMATICITIES)
+    except (RuntimeError, ValueError, OSError) as error:
+        raise FsidError(f"{path}: cannot be read as OpenEXR ({error})") from None
+    names = ("R", "G", "B") if "R" in channels else ("Y", "Y", "Y")
+    if not all(name in channels for name in names):
+        raise FsidError(
+            f"{path}: has the channels {', '.join(sorted(channels))}; R, G and B (or Y) are needed"
+        )
+    if not np.allclose(chromaticities, _SRGB_CHROMATICITIES, atol=2e-3):
+        raise FsidError(f"{path}: its primaries are not those of sRGB (Rec. 709); convert it to linear sRGB")
+    if len({channels[name].shape for name in names}) > 1:
+        raise FsidError(f"{path}: its channels differ in size (subsampled chroma); write plain R, G, B")
+    pixels = np.stack([channels[name] for name in names], axis=-1)
+    height, width = (size // 2 * 2 for size in pixels.shape[:2])
+    if min(height, width) < _SMALLEST_PX:
+        raise FsidError(f"{path}: is {pixels.shape[1]}x{pixels.shape[0]} pixels, at least 32x32 are needed")
+    if not np.isfinite(pixels).all():
+        raise FsidError(f"{path}: holds NaN or infinite values; render it again")
+    return pixels[:height, :width].clip(min=0)

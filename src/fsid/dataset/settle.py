@@ -1,0 +1,130 @@
+"""Near-duplicates across a dataset: the later of two frames that look alike is drawn again.
+
+    frame f is settled when it looks like no settled frame before it
+
+Frames are settled in their order, so the result depends on settings and seed alone: not on who made what
+when, and not on how often the run was interrupted. A frame that still looks like another one after
+`REDRAWS` attempts is kept.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fsid.dataset.config import GenerateConfig
+from fsid.dataset.sample import ATTEMPTS, encode, make_frame
+from fsid.dataset.shards import read_records, read_samples, write_shard
+from fsid.dataset.worker import Worker
+
+REDRAWS = ATTEMPTS // 2
+
+
+class Looks:
+    """Fingerprints of settled frames, 256 bits each; alike are two of which at most `near_bits` differ."""
+
+    def __init__(self, near_bits: int) -> None:
+        self._near_bits = near_bits
+        self._rows = np.empty((1024, 4), np.uint64)
+        self.count = 0
+
+    def has(self, looks: np.ndarray) -> bool:
+        """Whether one of `looks` (n, 4) is like one of the known."""
+        known = self._rows[: self.count]
+        return any(
+            bool((np.bitwise_count(known ^ row).sum(1, dtype=int) <= self._near_bits).any()) for row in looks
+        )
+
+    def add(self, looks: np.ndarray) -> None:
+        """Remember `looks` (n, 4)."""
+        while self.count + len(looks) > len(self._rows):
+            self._rows = np.concatenate([self._rows, np.empty_like(self._rows)])
+        self._rows[self.count : self.count + len(looks)] = looks
+        self.count += len(looks)
+
+    def forget(self, count: int) -> None:
+        """Remember only the first `count`."""
+        self.count = count
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """looks: (crops, 4). refused: why earlier attempts at it were."""
+
+    number: int
+    refused: tuple[str, ...]
+    looks: np.ndarray
+
+    def is_open(self, looks: Looks) -> bool:
+        """Whether it has to be drawn again."""
+        return len(self.refused) < REDRAWS and looks.has(self.looks)
+
+
+@dataclass(frozen=True)
+class Settle:
+    """The task of settling shards, in order; what is not drawn again is copied. looks: of those before."""
+
+    paths: tuple[Path, ...]
+    config: GenerateConfig
+    seed: int
+    looks: Looks
+
+    def __str__(self) -> str:
+        return f"the near-duplicates from {self.paths[0].name} on"
+
+    def do(self, worker: Worker) -> None:
+        for path in self.paths:
+            if _has_open(path, self.looks):
+                self._redraw(path, worker)
+
+    def _redraw(self, path: Path, worker: Worker) -> None:
+        samples = read_samples(path)
+        for frame in _frames(json.loads(files["json"]) for files in samples.values()):
+            last = frame
+            while last.is_open(self.looks):
+                refused = (*last.refused, "near-duplicate")
+                again = make_frame(
+                    self.config, self.seed, frame.number, worker.renderer(self.config), refused
+                )
+                samples |= {sample.key: encode(sample) for sample in again if sample.key in samples}
+                last = next(_frames(sample.record for sample in again))
+            self.looks.add(last.looks)
+        write_shard(path, samples.items())
+
+
+def settle(shards: Sequence[Path], config: GenerateConfig, seed: int, do: Callable[[Settle], None]) -> None:
+    """Settle the frames of all shards; `do` has a worker do a task. Not for pictures, see `Checks`."""
+    looks = Looks(config.checks.duplicate_bits)
+    if config.images or config.checks.duplicate_bits < 0:
+        return
+    for number, shard in enumerate(shards):
+        if _has_open(shard, looks):
+            do(Settle(tuple(shards[number:]), config, seed, looks))
+            return
+
+
+def _has_open(shard: Path, looks: Looks) -> bool:
+    """Whether a frame of the shard has to be drawn again; if none, all are remembered."""
+    before = looks.count
+    for frame in _frames(read_records(shard)):
+        if frame.is_open(looks):
+            looks.forget(before)
+            return True
+        looks.add(frame.looks)
+    return False
+
+
+def _frames(records: Iterable[Mapping[str, Any]]) -> Iterator[_Frame]:
+    """The frames of consecutive samples."""
+    by_number: dict[int, list[Mapping[str, Any]]] = {}
+    for record in records:
+        by_number.setdefault(record["frame"], []).append(record)
+    for number, samples in by_number.items():
+        prints = dict.fromkeys(record["fingerprint"] for record in samples)
+        looks = np.array([np.frombuffer(bytes.fromhex(each), np.uint64) for each in prints])
+        yield _Frame(number, tuple(samples[0]["refused"]), looks)
