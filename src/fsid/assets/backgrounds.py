@@ -60,7 +60,7 @@ def build_background(kind: str, size_m: Sequence[float]) -> Mesh:
 
 def table_size_m(size_m: Sequence[float]) -> tuple[float, float]:
     """Width along x and y of the table in the middle of a tabletop background."""
-    return (min(0.55 * size_m[0], 2.6), min(0.5 * size_m[1], 2.0))
+    return (min(0.8 * size_m[0], 2.6), min(0.8 * size_m[1], 2.6))
 
 
 def sweep_radius_m(size_m: Sequence[float]) -> float:

@@ -9,6 +9,8 @@ uniform in RGB is mostly garish. Real photographs are far less colourful than th
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 PALETTES = ("natural", "harmonised", "lab", "grey")
@@ -16,13 +18,29 @@ PALETTES = ("natural", "harmonised", "lab", "grey")
 
 _XYZ_TO_RGB = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
 _WHITE = np.array([0.9505, 1.0, 1.089])
+_DESATURATED = np.array([(1.0, keep, keep) for keep in (1.0, 0.8, 0.6, 0.4, 0.2, 0.0)])
 _NATURAL_HUES_DEG = (62.0, 80.0, 110.0, 262.0, 35.0)
 _NATURAL_SHARES = (0.34, 0.22, 0.18, 0.16, 0.10)
 
 
+class Mood(NamedTuple):
+    """What the colours of one scene share, as those of one photograph do.
+
+    hue_deg: CIELAB hue that the harmonised palette keeps to. chroma: factor on all chromas but lab's.
+    """
+
+    hue_deg: float
+    chroma: float
+
+
+def mood_rand(rng: np.random.Generator) -> Mood:
+    """A hue, and how colourful the scene is: most are muted, some vivid."""
+    return Mood(float(rng.uniform(0, 360)), float(np.exp(rng.normal(-0.15, 0.45))))
+
+
 def lab_to_rgb(lab: np.ndarray) -> np.ndarray:
     """CIELAB (..., 3) under D65 to linear sRGB, unclipped (CIE 15:2004; IEC 61966-2-1 primaries)."""
-    level, a, b = np.moveaxis(np.asarray(lab, dtype=float), -1, 0)
+    level, a, b = lab[..., 0], lab[..., 1], lab[..., 2]
     fy = (level + 16) / 116
     f = np.stack([fy + a / 500, fy, fy - b / 200], axis=-1)
     linear = np.where(f > 6 / 29, f**3, 3 * (6 / 29) ** 2 * (f - 4 / 29))
@@ -53,37 +71,36 @@ def blackbody_rgb(temperature_k: float) -> np.ndarray:
     return rgb / (rgb @ (0.2126, 0.7152, 0.0722))
 
 
-def lab_rand(rng: np.random.Generator, palette: str, scene_hue_deg: float) -> np.ndarray:
+def lab_rand(rng: np.random.Generator, palette: str, mood: Mood) -> np.ndarray:
     """(3,) one CIELAB colour of a palette model of `PALETTES`."""
-    level = rng.uniform(12, 93)
     if palette == "lab":
         while True:
             lab = np.array([rng.uniform(10, 95), *rng.uniform(-75, 75, 2)])
             if np.all((rgb := lab_to_rgb(lab)) > 0) and np.all(rgb < 1):
                 return lab
+    level = rng.triangular(14, 60, 94)
     if palette == "grey":
         hue, chroma = rng.uniform(0, 360), rng.uniform(0, 5)
     elif palette == "harmonised":
-        hue, chroma = scene_hue_deg + rng.normal(0, 14), rng.gamma(2.2, 7.0)
+        hue, chroma = mood.hue_deg + rng.normal(0, 14), rng.gamma(2.2, 7.0)
     else:
         hue = rng.choice(_NATURAL_HUES_DEG, p=_NATURAL_SHARES) + rng.normal(0, 14)
         chroma = rng.gamma(2.0, 6.5)
-    return np.array([level, *_polar(chroma, hue)])
+    return np.array([level, *_polar(chroma * mood.chroma, hue)])
 
 
 def related_rand(rng: np.random.Generator, lab: np.ndarray) -> np.ndarray:
     """(3,) CIELAB colour of the same stuff as `lab`: lighter or darker, nearly the same hue."""
     step = rng.uniform(7, 32) * (1 if rng.random() > (lab[0] - 8) / 86 else -1)
-    return np.array([np.clip(lab[0] + step, 6, 96), *(lab[1:] * rng.uniform(0.6, 1.3) + rng.normal(0, 3, 2))])
+    return np.array([np.clip(lab[0] + step, 6, 96), *(lab[1:] * rng.uniform(0.6, 1.3) + rng.normal(0, 2, 2))])
 
 
 def albedo_rgb(lab: np.ndarray, low: float, high: float) -> np.ndarray:
-    """(3,) linear albedo of `lab`, desaturated until it is inside the gamut, clipped to [low, high]."""
-    for keep in (1.0, 0.8, 0.6, 0.4, 0.2, 0.0):
-        rgb = lab_to_rgb(lab * (1, keep, keep))
-        if rgb.min() >= 0 and rgb.max() <= 1:
-            break
-    return np.clip(rgb, low, high)
+    """(N, 3) linear albedos of `lab` (N, 3), desaturated until inside the gamut, clipped to [low, high]."""
+    rgb = lab_to_rgb(lab[:, None] * _DESATURATED)
+    inside = np.asarray(((rgb >= 0) & (rgb <= 1)).all(axis=2))
+    inside[:, -1] = True
+    return np.clip(rgb[np.arange(len(rgb)), inside.argmax(1)], low, high)
 
 
 def _polar(chroma: float, hue_deg: float) -> tuple[float, float]:

@@ -1,16 +1,31 @@
-"""M: a random baked family, recoloured. One draw = one `Material`."""
+"""M: a random baked family, recoloured, with the finish that its part asks for. One draw = one `Material`."""
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
-from fsid.assets import MATERIAL_VARIANTS, material_families, material_tile_m
-from fsid.scene.colour import PALETTES, albedo_rgb, lab_rand, related_rand
-from fsid.scene.config import Range, SceneConfig
+from fsid.assets import (
+    MATERIAL_VARIANTS,
+    material_colours,
+    material_families,
+    material_layers,
+    material_tile_m,
+)
+from fsid.scene.choice import log_uniform_rand, pick_rand
+from fsid.scene.colour import PALETTES, Mood, albedo_rgb, lab_rand, related_rand
+from fsid.scene.config import SceneConfig
+from fsid.scene.lobes import lobes_rand
 from fsid.scene.model import Material, Vec3
+from fsid.scene.pools import OFTEN_PLAIN, POOLS
+from fsid.scene.sources import FILE, texture_rand
+from fsid.scene.vectors import vec3
+
+PLAIN_FAMILY = "paint"
 
 PLAIN = Material(
-    family="paint",
+    family=PLAIN_FAMILY,
     variant=0,
     colours=((0.4, 0.4, 0.4), (0.4, 0.4, 0.4), (0.4, 0.4, 0.4)),
     tile_m=0.8,
@@ -21,39 +36,63 @@ PLAIN = Material(
 """The one plain default material of variant v1 ("objects")."""
 
 
-def log_uniform_rand(rng: np.random.Generator, limits: Range) -> float:
-    """A number whose logarithm is uniform between the two positive limits."""
-    return float(np.exp(rng.uniform(*np.log(limits))))
+def material_rand(rng: np.random.Generator, config: SceneConfig, mood: Mood, part_name: str) -> Material:
+    """The material of an object's part; its name may say what it is made of (`fsid.assets.part_kind`)."""
+    plain, family = rng.random() < config.materials.plain_share, texture_rand(rng, config)
+    material = _finished_rand(rng, config, mood, PLAIN_FAMILY if plain else family)
+    return lobes_rand(rng, config.materials, material, part_name)
 
 
-def material_rand(rng: np.random.Generator, config: SceneConfig, scene_hue_deg: float) -> Material:
-    """One material; `scene_hue_deg` (CIELAB) is the hue that the harmonised palette keeps to."""
-    plain = rng.random() < config.plain_share
-    family = "paint" if plain else str(rng.choice(config.material_families or material_families()))
-    palette = str(rng.choice(PALETTES, p=config.palette_shares))
-    base = lab_rand(rng, palette, scene_hue_deg)
-    contrast = _contrasting_rand(rng, base, palette, scene_hue_deg)
+def surface_rand(rng: np.random.Generator, config: SceneConfig, mood: Mood, surface: str) -> Material:
+    """The material of a background's part, by its pool."""
+    share = config.background.plain_share if surface in OFTEN_PLAIN else config.materials.plain_share
+    plain, family = rng.random() < share, texture_rand(rng, config)
+    known = config.material_families or material_families()
+    pool = tuple(name for name in POOLS[surface] if name in known) or known
+    common = pick_rand(rng, pool)
+    if rng.random() < config.background.pool_share and not family.startswith(FILE):
+        family = common
+    return _finished_rand(rng, config, mood, PLAIN_FAMILY if plain else family)
+
+
+def _finished_rand(rng: np.random.Generator, config: SceneConfig, mood: Mood, family: str) -> Material:
+    """`family` in random colours, size and relief."""
+    knobs = config.materials
+    variant = int(rng.integers(MATERIAL_VARIANTS))
+    layered, layer = rng.random() < knobs.layer_share, pick_rand(rng, material_layers())
+    natural, colours = rng.random() < knobs.natural_share, _colours_rand(rng, config, mood)
+    in_nature = _colours_of(family, variant) if natural or family.startswith(FILE) else None
     return Material(
-        family=family,
-        variant=int(rng.integers(MATERIAL_VARIANTS)),
-        colours=(
-            _albedo(base, config),
-            _albedo(related_rand(rng, base), config),
-            _albedo(contrast, config),
-        ),
-        tile_m=material_tile_m(family) * log_uniform_rand(rng, config.tile_scale),
+        family=f"{family}+{layer}" if layered and family != PLAIN_FAMILY else family,
+        variant=variant,
+        colours=in_nature or colours,
+        tile_m=material_tile_m(family) * log_uniform_rand(rng, knobs.tile_scale),
         rotation_deg=float(rng.uniform(0, 360)),
-        roughness_scale=float(rng.uniform(*config.roughness_scale)),
-        relief_scale=float(rng.uniform(*config.relief_scale)),
+        roughness_scale=float(rng.uniform(*knobs.roughness_scale)),
+        relief_scale=float(rng.uniform(*knobs.relief_scale)),
     )
 
 
-def _contrasting_rand(rng: np.random.Generator, base: np.ndarray, palette: str, hue: float) -> np.ndarray:
-    """The most different in lightness of three draws: prints and joints should stand out."""
-    draws = [lab_rand(rng, palette, hue) for _ in range(3)]
+def _colours_rand(rng: np.random.Generator, config: SceneConfig, mood: Mood) -> tuple[Vec3, Vec3, Vec3]:
+    """A colour, one of the same stuff, and one that stands out."""
+    knobs = config.materials
+    palette = PALETTES[int(rng.choice(len(PALETTES), p=knobs.palette_shares))]
+    contrast = float(rng.uniform(*knobs.contrast))
+    base = lab_rand(rng, palette, mood)
+    related = base + contrast * (related_rand(rng, base) - base)
+    other = base + contrast * (_contrasting_rand(rng, base, palette, mood) - base)
+    a, b, c = albedo_rgb(np.stack([base, related, other]), *knobs.albedo)
+    return vec3(a), vec3(b), vec3(c)
+
+
+@lru_cache(maxsize=4096)
+def _colours_of(family: str, variant: int) -> tuple[Vec3, Vec3, Vec3] | None:
+    """The family's own colours, those of a picture for a texture set; None where it has none."""
+    own = material_colours(family, variant)
+    return None if own is None else (vec3(own[0]), vec3(own[1]), vec3(own[2]))
+
+
+def _contrasting_rand(rng: np.random.Generator, base: np.ndarray, palette: str, mood: Mood) -> np.ndarray:
+    """The more different in lightness of two draws: prints and joints should stand out."""
+    draws = [lab_rand(rng, palette, mood) for _ in range(2)]
     return max(draws, key=lambda lab: abs(lab[0] - base[0]))
-
-
-def _albedo(lab: np.ndarray, config: SceneConfig) -> Vec3:
-    r, g, b = (float(c) for c in albedo_rgb(lab, *config.albedo))
-    return (r, g, b)

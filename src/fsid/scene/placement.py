@@ -1,45 +1,54 @@
-"""T: where objects stand. Two arrangements of one list of meshes around the origin of the floor.
+"""T: where objects stand. Two arrangements of one list of meshes around the origin of the ground.
 
     arranged   variants v1-v3: upright in slots that depend on no seed, tops below z = 0.19 m + 0.32 rho
     scattered  variant v4: random rotation (20 angles per axis), scale and place, at rest or floating
 
-Density matters more than order: objects may touch and overlap, but none may swallow the camera or a
-light. `arranged` guarantees that by its funnel shape (cameras and lights start at 20 degrees above the
-focus), `scattered` by shrinking whatever comes too near; neither draws a random number for it, so the
+Density matters more than order: objects may touch and overlap, but none may swallow a camera or a light.
+`arranged` guarantees that by its funnel shape (cameras and lights start at 20 degrees above the focus, or
+outside of it), `scattered` by shrinking whatever comes too near; neither draws a random number for it, so the
 streams of the camera and of the lights are the same whatever the objects do.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from fsid.assets import Mesh
+from fsid.assets import build_mesh
 from fsid.assets.solids import rotation_matrix
-from fsid.scene.config import SceneConfig
-from fsid.scene.materials import log_uniform_rand
-from fsid.scene.model import Transform, Vec3
+from fsid.scene.choice import log_uniform_rand, power_law_rand
+from fsid.scene.config import PlacementConfig
+from fsid.scene.model import Object, Transform
+from fsid.scene.relief import Relief, surface_points
+from fsid.scene.surroundings import Space
+from fsid.scene.vectors import vec3
+
+ARRANGED_M = 0.85
+"""Radius of the slots of v1-v3; their objects end at 1.2 m."""
 
 _CANDIDATES = 6
 _CLEARANCE = 0.75
 """An object's bounding sphere stays smaller than this part of its distance to a camera or light."""
-_PILE_LIMIT_M = 0.5
+_PILE_LIMIT_M = 0.6
 """Things come to rest on others whose top is lower than this."""
+_SINK = 0.01
+"""Part of its size by which a resting object sinks in: contact has no gap."""
 
 
-def arranged(rng: np.random.Generator, meshes: Sequence[Mesh], spread_m: float) -> list[Transform]:
+def arranged(rng: np.random.Generator, objects: Sequence[Object], spread_m: float) -> list[Transform]:
     """Upright objects, uniformly scaled to fit slots on a sunflower spiral, low at the focus.
 
     rng: a generator that is the same for every scene.
     """
     out = []
-    for i, mesh in enumerate(meshes):
-        rho = spread_m * np.sqrt((i + 0.3) / len(meshes))
+    for i, S in enumerate(objects):
+        rho = min(spread_m, ARRANGED_M) * np.sqrt((i + 0.3) / len(objects))
         angle = 2.399963 * i
         width = (0.3 + 0.3 * rho) * rng.uniform(0.8, 1.25)
         turn_deg = 90.0 * int(rng.integers(4))
-        extent = np.ptp(mesh.vertices, axis=0)
+        extent = np.ptp(build_mesh(S.family, S.seed).vertices, axis=0)
         height = 0.19 + 0.32 * max(rho - width / 2, 0.0)
         scale = float(min(width / extent[:2].max(), height / extent[2]))
         place = (float(rho * np.cos(angle)), float(rho * np.sin(angle)), 0.0)
@@ -47,89 +56,101 @@ def arranged(rng: np.random.Generator, meshes: Sequence[Mesh], spread_m: float) 
     return out
 
 
+class _Draw(NamedTuple):
+    """What one object's generator says, before the object meets the others."""
+
+    turn_deg: np.ndarray
+    size_m: float
+    stretch: np.ndarray
+    floating: bool
+    spots: np.ndarray
+
+
 def scattered(
     rngs: Sequence[np.random.Generator],
-    meshes: Sequence[Mesh],
-    room_m: Vec3,
+    objects: Sequence[Object],
+    space: Space,
     focus_m: np.ndarray,
     keep_clear_m: np.ndarray,
-    config: SceneConfig,
+    config: PlacementConfig,
 ) -> list[Transform]:
     """Random transforms, one generator per object so that no object disturbs the draws of the next.
 
-    room_m: width, depth, height. focus_m: (3,). keep_clear_m: (P, 3), the camera first, then the lights.
+    focus_m: (3,). keep_clear_m: (P, 3), a camera first, then the other cameras and lights.
     """
     out: list[Transform] = []
-    boxes: list[np.ndarray] = []
-    for rng, mesh in zip(rngs, meshes, strict=True):
-        turn = rng.integers(config.rotation_steps, size=3) * (360.0 / config.rotation_steps)
-        size_m = log_uniform_rand(rng, config.object_size_m)
-        shape = np.array([log_uniform_rand(rng, config.stretch) for _ in range(3)])
-        shape *= size_m / (np.ptp(mesh.vertices, axis=0) * shape).max()
-        floating = rng.random() < config.floating_share
-        spots = _spots_rand(rng, room_m, focus_m, config.spread_m)
-        spot = min(spots, key=lambda s: _crowding(s, size_m, boxes, keep_clear_m[0], focus_m))
-        box = _rotated_box(mesh, shape, turn)
-        for _ in range(40):
-            offset = _offset(box, spot, boxes, floating)
-            if _is_clear(box + offset, keep_clear_m):
-                break
-            box, shape = box * 0.85, shape * 0.85
-        boxes.append(box + offset)
-        out.append(Transform(_vec3(offset), _vec3(turn), _vec3(shape)))
+    spheres: list[tuple[np.ndarray, float]] = []
+    relief = Relief(space)
+    for rng, S in zip(rngs, objects, strict=True):
+        draw = _draw_rand(rng, space, focus_m, config)
+        points = surface_points(S.family, S.seed)
+        shape = draw.stretch * draw.size_m / (np.ptp(points, axis=1) * draw.stretch).max()
+        crowding = _crowding(draw.spots, draw.size_m, spheres, keep_clear_m[0], focus_m)
+        spot = draw.spots[int(crowding.argmin())]
+        turned = (rotation_matrix(*draw.turn_deg) * shape).astype(np.float32) @ points
+        offset, shrink = _placed(turned, spot, draw.floating, relief, keep_clear_m)
+        world = turned * np.float32(shrink) + offset[:, None].astype(np.float32)
+        if not draw.floating:
+            relief.add(world)
+        spheres.append((world.mean(1), float(np.ptp(world, axis=1).max())))
+        out.append(Transform(vec3(offset), vec3(draw.turn_deg), vec3(shape * shrink)))
     return out
 
 
-def _spots_rand(rng: np.random.Generator, room_m: Vec3, focus_m: np.ndarray, spread_m: float) -> np.ndarray:
-    """(K, 3) candidate centres, denser towards the focus, inside the room."""
-    rho = spread_m * rng.random(_CANDIDATES)
+def _draw_rand(rng: np.random.Generator, space: Space, focus_m: np.ndarray, config: PlacementConfig) -> _Draw:
+    turn_deg = rng.integers(config.rotation_steps, size=3) * (360.0 / config.rotation_steps)
+    size_m = power_law_rand(rng, config.size_m, config.size_exponent)
+    stretch = np.array([log_uniform_rand(rng, config.stretch) for _ in range(3)])
+    floating, far = rng.random(2) < (config.floating_share, config.far_share)
+    distance = log_uniform_rand(rng, (config.spread_m, config.spread_m * config.far_factor))
+    rho = config.spread_m * rng.random(_CANDIDATES)
     phi = rng.uniform(0, 2 * np.pi, _CANDIDATES)
     z = focus_m[2] + rng.normal(0.15, 0.4, _CANDIDATES)
+    if far:
+        rho = rho * 0.5 + distance
+        size_m *= distance / config.spread_m
     spots = np.c_[focus_m[0] + rho * np.cos(phi), focus_m[1] + rho * np.sin(phi), z]
-    half = np.array(room_m) / (2, 2, 1) - 0.1
-    return np.clip(spots, (-half[0], -half[1], 0.1), half)
+    return _Draw(turn_deg, size_m, stretch, bool(floating), np.clip(spots, space.low, space.high))
 
 
 def _crowding(
-    spot: np.ndarray, size_m: float, boxes: Sequence[np.ndarray], camera_m: np.ndarray, focus_m: np.ndarray
-) -> float:
-    """How bad a spot is: overlap with what is there, and blocking the view at close range."""
+    spots: np.ndarray,
+    size_m: float,
+    spheres: Sequence[tuple[np.ndarray, float]],
+    camera_m: np.ndarray,
+    focus_m: np.ndarray,
+) -> np.ndarray:
+    """(K,) how bad spots (K, 3) are: overlap with what is there, and blocking the view at close range."""
     to_focus = focus_m - camera_m
-    distance = np.linalg.norm(to_focus)
-    offset = spot - camera_m
-    ahead = offset @ to_focus / distance
-    aside = np.linalg.norm(offset - to_focus * (ahead / distance))
-    blocked = 0 < ahead < 0.6 * distance + size_m / 2 and aside < 0.5 * ahead + size_m / 2
-    overlap = 0.0
-    for box in boxes:
-        reach = (size_m + np.ptp(box, axis=0).max()) * 0.4
-        overlap += max(0.0, 1 - float(np.linalg.norm(spot[:2] - box.mean(0)[:2])) / reach)
-    return overlap + 10.0 * blocked
+    distance = np.sqrt(to_focus @ to_focus)
+    offsets = spots - camera_m
+    ahead = offsets @ to_focus / distance
+    aside = np.sqrt(np.maximum((offsets**2).sum(1) - ahead**2, 0.0))
+    blocked = (ahead > 0) & (ahead < 0.6 * distance + size_m / 2) & (aside < 0.5 * ahead + size_m / 2)
+    if not spheres:
+        return 10.0 * blocked
+    centres = np.array([centre[:2] for centre, _ in spheres])
+    gaps = np.sqrt(((spots[:, None, :2] - centres) ** 2).sum(2))
+    reach = (size_m + np.array([width for _, width in spheres])) * 0.4
+    return np.maximum(0.0, 1 - gaps / reach).sum(1) + 10.0 * blocked
 
 
-def _rotated_box(mesh: Mesh, scale: np.ndarray, turn_deg: np.ndarray) -> np.ndarray:
-    """(2, 3) lowest and highest corner of the scaled and rotated mesh about its own origin."""
-    vertices = (mesh.vertices * scale) @ rotation_matrix(*turn_deg).T
-    return np.stack([vertices.min(0), vertices.max(0)])
-
-
-def _offset(box: np.ndarray, spot: np.ndarray, boxes: Sequence[np.ndarray], floating: bool) -> np.ndarray:
-    """(3,) translation that centres the box at the spot, or lets it rest below the spot."""
-    offset = spot - box.mean(0)
-    core = box[:, :2].mean(0) + 0.5 * (box[:, :2] - box[:, :2].mean(0)) + offset[:2]
-    under = [b[1, 2] for b in boxes if (b[0, :2] < core[1]).all() and (b[1, :2] > core[0]).all()]
-    support = max((top for top in under if top < _PILE_LIMIT_M), default=0.0)
-    lowest = -box[0, 2]
-    offset[2] = max(offset[2], lowest) if floating else support + lowest
-    return offset
-
-
-def _is_clear(box: np.ndarray, points: np.ndarray) -> bool:
-    """Whether the bounding sphere of the box keeps its distance from every point."""
-    radius = np.linalg.norm(np.ptp(box, axis=0)) / 2
-    return bool((np.linalg.norm(points - box.mean(0), axis=1) * _CLEARANCE >= radius).all())
-
-
-def _vec3(values: np.ndarray) -> Vec3:
-    x, y, z = (float(v) for v in values)
-    return (x, y, z)
+def _placed(
+    turned: np.ndarray, spot: np.ndarray, floating: bool, relief: Relief, keep_clear_m: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """Where an object of points (3, P) goes, (3,) metres, and how much it had to shrink to keep clear."""
+    low, high = turned.min(1), turned.max(1)
+    middle, radius = (low + high) / 2, float(np.linalg.norm(high - low) / 2)
+    offset, shrink = spot, 1.0
+    for _ in range(40):
+        offset = spot - middle * shrink
+        if floating:
+            offset[2] = max(offset[2], -shrink * float(low[2]))
+        else:
+            lift_m = relief.rest_m(turned * np.float32(shrink), offset[:2], _PILE_LIMIT_M)
+            offset[2] = lift_m - _SINK * 2 * radius * shrink
+        gaps = np.linalg.norm(keep_clear_m - (middle * shrink + offset), axis=1)
+        if (gaps * _CLEARANCE >= radius * shrink).all():
+            break
+        shrink *= 0.85
+    return offset, shrink

@@ -12,9 +12,10 @@ from dataclasses import asdict, fields, is_dataclass
 from types import GenericAlias, NoneType, UnionType
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
+from fsid.assets import BACKGROUND_PARTS
 from fsid.errors import FsidError
+from fsid.scene.lens import check_distortion, corner_radius
 from fsid.scene.model import Scene
-from fsid.scene.sampler import SURFACES
 
 
 def scene_to_json(scene: Scene) -> str:
@@ -31,9 +32,17 @@ def scene_from_json(text: str) -> Scene:
     scene: Scene = _read(Scene, data, "scene")
     for key in ("materials", "transforms"):
         _expect(len(getattr(scene, key)) == len(scene.objects), f"scene.{key}", "as long as scene.objects")
-    if scene.background.kind == "room":
-        named = set(scene.background.materials) == set(SURFACES)
-        _expect(named, "scene.background.materials", f"one material for each of {', '.join(SURFACES)}")
+    _expect(
+        len(scene.motions) in (0, len(scene.objects)), "scene.motions", "empty or as long as scene.objects"
+    )
+    kind = scene.background.kind
+    _expect(kind in BACKGROUND_PARTS, "scene.background.kind", f"one of {', '.join(BACKGROUND_PARTS)}")
+    named = set(scene.background.materials) == set(BACKGROUND_PARTS[kind])
+    surfaces = ", ".join(BACKGROUND_PARTS[kind])
+    _expect(named, "scene.background.materials", f"one material for each of {surfaces}")
+    for camera in scene.cameras:
+        if camera.distortion is not None:
+            check_distortion(camera.distortion, corner_radius(camera))
     return scene
 
 

@@ -1,0 +1,94 @@
+"""How a scene is seen: view, rig, movement and lens. The defaults are one sharp, still pinhole camera."""
+
+# ruff: noqa: RUF009  (a knob is a dataclass field)
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from fsid.scene.knobs import Range, check_knobs, knob
+
+
+@dataclass(frozen=True)
+class CameraConfig:
+    """Where the camera stands and how wide it sees."""
+
+    distance_m: Range = knob((0.45, 3.0), 0.2, 100.0)
+    """Distance from the focus; log-uniform. At least 1.25 m below 20 degrees of elevation."""
+    elevation_deg: Range = knob((4.0, 75.0), 0.0, 88.0)
+    """Angle above the horizon seen from the focus: low views see walls and horizon, high ones the ground."""
+    fov_deg: Range = knob((28.0, 72.0), 5.0, 150.0)
+    """Horizontal field of view."""
+    roll_deg: float = knob(6.0, 0.0, 180.0)
+    """Standard deviation of the camera's roll."""
+
+    def __post_init__(self) -> None:
+        check_knobs(self)
+
+
+@dataclass(frozen=True)
+class RigConfig:
+    """Cameras that see the scene at the same time: 1 mono, 2 stereo, N an array; numbered by `Camera.eye`."""
+
+    eyes: int = knob(1, 1, 64)
+    """Number of cameras, side by side, centred on the drawn view."""
+    baseline_m: Range = knob((0.05, 0.08), 0.0, 10.0)
+    """Distance between neighbours."""
+    convergence: float = knob(0.0, 0.0, 1.0)
+    """0: parallel axes. 1: all look at the same point. Between: turned by that part."""
+
+    def __post_init__(self) -> None:
+        check_knobs(self)
+
+
+@dataclass(frozen=True)
+class MotionConfig:
+    """Time: a burst of frames from a hand-held camera, moving objects, and the blur of both."""
+
+    frames: int = knob(1, 1, 1000)
+    """Number of frames of each eye; numbered by `Camera.frame`."""
+    interval_s: float = knob(1 / 30, 1e-4, 10.0)
+    """Time between frames."""
+    exposure_s: Range = knob((0.0, 0.0), 0.0, 10.0)
+    """Shutter time; above 0 everything that moves is blurred."""
+    shake_deg: Range = knob((0.05, 0.4), 0.0, 20.0)
+    """Hand tremor: standard deviation of the camera's angle about each axis; log-uniform if above 0."""
+    shake_m: Range = knob((0.0005, 0.003), 0.0, 1.0)
+    """Hand tremor: standard deviation of the camera's position along each axis; log-uniform if above 0."""
+    moving_share: float = knob(0.0, 0.0, 1.0)
+    """Share of objects that move."""
+    speed_m_s: Range = knob((0.02, 0.5), 1e-4, 50.0)
+    """Speed of a moving object; log-uniform."""
+    spin_deg_s: Range = knob((1.0, 90.0), 0.01, 10000.0)
+    """Angular speed of a moving object; log-uniform."""
+
+    def __post_init__(self) -> None:
+        check_knobs(self)
+
+
+@dataclass(frozen=True)
+class LensConfig:
+    """What a real lens does to the image; every share is one of scenes."""
+
+    distortion_share: float = knob(0.0, 0.0, 1.0)
+    """Share with Brown-Conrady distortion."""
+    distortion: Range = knob((-0.15, 0.08), -0.5, 0.5)
+    """Displacement at the corner of the image relative to its radius: below 0 barrel, above pincushion."""
+    fisheye_share: float = knob(0.0, 0.0, 1.0)
+    """Share with a fisheye lens instead."""
+    blur_share: float = knob(0.0, 0.0, 1.0)
+    """Share with depth of field: the rest is sharp everywhere."""
+    aperture_m: Range = knob((0.001, 0.008), 1e-5, 0.5)
+    """Diameter of the lens opening, for depth of field; log-uniform."""
+    focus: Range = knob((0.8, 1.3), 0.1, 10.0)
+    """Depth of the sharp plane relative to the distance of the focus."""
+    vignetting_share: float = knob(0.0, 0.0, 1.0)
+    """Share whose corners are darker."""
+    vignetting: Range = knob((0.02, 0.4), 0.0, 0.95)
+    """Light lost in the corner of the image."""
+    fringe_share: float = knob(0.0, 0.0, 1.0)
+    """Share with lateral chromatic aberration."""
+    fringe: Range = knob((-0.0008, 0.0008), -0.02, 0.02)
+    """Magnification of red and of blue relative to green, minus 1."""
+
+    def __post_init__(self) -> None:
+        check_knobs(self)

@@ -1,0 +1,72 @@
+"""Where S, M and the sky come from: the families of FSID, and the folders that the user names.
+
+Files are told apart by their path inside their folder, so a folder may move without changing a scene.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from fsid.assets import material_families, mesh_families, mesh_sources, texture_sources
+from fsid.errors import FsidError
+from fsid.scene.choice import pick_rand
+from fsid.scene.config import SceneConfig
+
+FILE = "file:"
+_SKY_SUFFIXES = (".hdr", ".exr")
+
+Names = tuple[str, ...]
+
+
+def mesh_rand(rng: np.random.Generator, config: SceneConfig) -> str:
+    """A name for `Object.family`."""
+    families = config.mesh_families or mesh_families()
+    return _rand(rng, families, config.mesh_folders, config.mesh_folder_share, mesh_sources)
+
+
+def texture_rand(rng: np.random.Generator, config: SceneConfig) -> str:
+    """A name for `Material.family`."""
+    families = config.material_families or material_families()
+    return _rand(rng, families, config.texture_folders, config.texture_folder_share, texture_sources)
+
+
+def sky_rand(rng: np.random.Generator, config: SceneConfig) -> str:
+    """A name for `Sky.source`."""
+    folders = (config.hdri_folder,) if config.hdri_folder else ()
+    return _rand(rng, ("procedural",), folders, config.hdri_share, _skies)
+
+
+def _rand(
+    rng: np.random.Generator, families: Names, folders: Names, share: float, find: Callable[[str], Names]
+) -> str:
+    """A family, or a file in `share` of the draws if there are folders; the family is drawn in any case."""
+    family, from_file = pick_rand(rng, families), rng.random() < share
+    if not folders:
+        return family
+    names, labels = _catalogue(folders, find)
+    chosen = names[labels.index(pick_rand(rng, labels))]
+    return chosen if from_file else family
+
+
+@lru_cache(maxsize=16)
+def _catalogue(folders: Names, find: Callable[[str], Names]) -> tuple[Names, Names]:
+    """The names of all files, and what they are called within their folder."""
+    found = [
+        (name, name.removeprefix(FILE).removeprefix(folder)) for folder in folders for name in find(folder)
+    ]
+    names, labels = zip(*found, strict=True)
+    return names, labels
+
+
+def _skies(folder: str) -> Names:
+    """The panoramas directly inside a folder, sorted by name."""
+    if not Path(folder).is_dir():
+        raise FsidError(f"{folder}: there is no such folder of skies")
+    files = sorted(path for path in Path(folder).iterdir() if path.suffix.lower() in _SKY_SUFFIXES)
+    if not files:
+        raise FsidError(f"{folder}: holds no panorama ({', '.join(_SKY_SUFFIXES)})")
+    return tuple(f"{FILE}{path}" for path in files)

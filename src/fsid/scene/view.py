@@ -1,0 +1,130 @@
+"""Cameras: one view of the focus, then the eyes of a rig and the frames of a burst around it.
+
+    eye e      moved by (e - (E - 1) / 2) baselines to the right
+    frame f    at time f * interval: hand tremor is a sum of sines per axis, zero at time 0
+
+A sine has a derivative, so each frame knows the velocity that blurs it; amplitudes fall as 1 / frequency over
+the 1 to 12 Hz of a hand (physiological tremor: Elble and Randall 1976). Frame 0 of the middle view is the
+view as drawn, so a burst shows the scene that a single picture of the same seed shows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from fsid.assets.solids import rotation_matrix
+from fsid.scene.camera_config import CameraConfig, MotionConfig, RigConfig
+from fsid.scene.choice import log_uniform_rand
+from fsid.scene.knobs import Range
+from fsid.scene.model import Camera, Motion
+from fsid.scene.surroundings import Space
+from fsid.scene.vectors import direction_of, vec3
+
+LOW_VIEW_DEG, LOW_VIEW_M = 20.0, 1.25
+"""Below this elevation a camera keeps this distance: the fixed arrangement of v1-v3 ends before it."""
+
+_TREMOR_HZ = (1.0, 12.0)
+_SINES = 6
+
+
+def camera_rand(
+    rng: np.random.Generator, config: CameraConfig, space: Space, width: int, height: int
+) -> tuple[Camera, np.ndarray]:
+    """A camera inside the space that looks at the focus, and the focus (3,) in metres."""
+    focus = np.array([0.0, 0.0, rng.uniform(0.2, 0.5)])
+    distance = log_uniform_rand(rng, config.distance_m)
+    azimuth_deg, elevation_deg = rng.uniform(0, 360), rng.uniform(*config.elevation_deg)
+    if elevation_deg < LOW_VIEW_DEG:
+        distance = max(distance, LOW_VIEW_M / np.cos(np.radians(elevation_deg)))
+    direction = direction_of(azimuth_deg, elevation_deg)
+    position = focus + direction * space.reach(focus, direction, distance)
+    target = focus + rng.normal(0, 0.12, 3) * np.linalg.norm(position - focus)
+    roll = np.radians(rng.normal(0, config.roll_deg))
+    forward = (target - position) / np.linalg.norm(target - position)
+    right = np.cross(forward, (0.0, 0.0, 1.0))
+    if np.linalg.norm(right) < 1e-3:
+        right = direction_of(azimuth_deg + 90, 0)
+    right /= np.linalg.norm(right)
+    up = np.cos(roll) * np.cross(right, forward) + np.sin(roll) * right
+    fov_deg = float(rng.uniform(*config.fov_deg))
+    return Camera(vec3(position), vec3(target), vec3(up), fov_deg, width, height), focus
+
+
+def rig_rand(rng: np.random.Generator, config: RigConfig, camera: Camera) -> list[Camera]:
+    """The eyes of a rig; one eye is the camera itself."""
+    baseline_m = float(rng.uniform(*config.baseline_m))
+    position, target = np.array(camera.position_m), np.array(camera.target_m)
+    right = np.cross(target - position, camera.up)
+    right /= np.linalg.norm(right)
+    eyes = []
+    for eye in range(config.eyes):
+        shift = right * baseline_m * (eye - (config.eyes - 1) / 2)
+        aim = target + shift * (1 - config.convergence)
+        eyes.append(replace(camera, position_m=vec3(position + shift), target_m=vec3(aim), eye=eye))
+    return eyes
+
+
+def burst_rand(rng: np.random.Generator, config: MotionConfig, eyes: list[Camera]) -> tuple[Camera, ...]:
+    """Frames x eyes cameras, all frames of an eye in a row; the eyes shake together."""
+    exposure_s = float(rng.uniform(*config.exposure_s))
+    wave_hz = _TREMOR_HZ[0] * (_TREMOR_HZ[1] / _TREMOR_HZ[0]) ** rng.random((_SINES, 6))
+    phase = rng.uniform(0, 2 * np.pi, (_SINES, 6))
+    angle_deg, shift_m = _shake_rand(rng, config.shake_deg), _shake_rand(rng, config.shake_m)
+    scale = np.repeat((shift_m, angle_deg), 3) * np.sqrt(2.0)
+    amplitude = scale / wave_hz / np.sqrt((1 / wave_hz**2).sum(0))
+    if config.frames == 1 and exposure_s == 0:
+        return tuple(eyes)
+    centre = np.mean([eye.position_m for eye in eyes], axis=0)
+    out = []
+    for eye in eyes:
+        for frame in range(config.frames):
+            turn = 2 * np.pi * wave_hz * frame * config.interval_s + phase
+            at = (amplitude * (np.sin(turn) - np.sin(phase))).sum(0)
+            speed = (amplitude * 2 * np.pi * wave_hz * np.cos(turn)).sum(0)
+            moved = _moved(eye, centre, at[:3], at[3:])
+            swing = np.cross(np.radians(speed[3:]), np.subtract(eye.position_m, centre))
+            out.append(
+                replace(
+                    moved,
+                    frame=frame,
+                    time_s=frame * config.interval_s,
+                    exposure_s=exposure_s,
+                    velocity_m_s=vec3(speed[:3] + swing),
+                    spin_deg_s=vec3(speed[3:]),
+                )
+            )
+    return tuple(out)
+
+
+def motions_rand(stream: np.random.SeedSequence, config: MotionConfig, count: int) -> tuple[Motion, ...]:
+    """One motion per object; empty where no time passes or nothing moves."""
+    if not config.moving_share or (config.frames == 1 and config.exposure_s[1] == 0):
+        return ()
+    return tuple(_motion_rand(np.random.default_rng(s), config) for s in stream.spawn(count))
+
+
+def _motion_rand(rng: np.random.Generator, config: MotionConfig) -> Motion:
+    moving = rng.random() < config.moving_share
+    headings = rng.normal(size=(2, 3))
+    headings /= np.linalg.norm(headings, axis=1, keepdims=True)
+    speed, spin = log_uniform_rand(rng, config.speed_m_s), log_uniform_rand(rng, config.spin_deg_s)
+    return Motion(vec3(headings[0] * speed), vec3(headings[1] * spin)) if moving else Motion()
+
+
+def _shake_rand(rng: np.random.Generator, limits: Range) -> float:
+    """Log-uniform where the limits allow it, uniform where they include 0."""
+    at = rng.random()
+    low, high = limits
+    return float(low * (high / low) ** at) if low > 0 else float(low + at * (high - low))
+
+
+def _moved(camera: Camera, centre_m: np.ndarray, shift_m: np.ndarray, turn_deg: np.ndarray) -> Camera:
+    """The camera shifted, and turned by small angles about the world axes through the middle of its rig."""
+    turn = rotation_matrix(*turn_deg)
+    position = centre_m + shift_m + turn @ np.subtract(camera.position_m, centre_m)
+    target = position + turn @ np.subtract(camera.target_m, camera.position_m)
+    return replace(
+        camera, position_m=vec3(position), target_m=vec3(target), up=vec3(turn @ np.array(camera.up))
+    )
