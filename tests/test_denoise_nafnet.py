@@ -6,7 +6,7 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from fsid.denoise.nafnet import NAFBlock, NAFNet, frozen_pooling  # noqa: E402
+from fsid.denoise.nafnet import NAFBlock, NAFNet, frozen_pooling, pooling  # noqa: E402
 
 
 def randomised(net: torch.nn.Module, seed: int = 0) -> torch.nn.Module:
@@ -90,7 +90,7 @@ def test_with_frozen_averages_nothing_reaches_beyond_the_receptive_radius(
     image = torch.randn(1, 4, 80, 80, dtype=torch.double)
     for centre in (40, 41, 42, 43):  # one per position in a cell of the coarsest scale
         probe = image.clone().requires_grad_()
-        with frozen_pooling(net, lambda: net(image)):
+        with frozen_pooling(net, pooling(net, lambda: net(image))):
             net(probe)[0, :, centre, centre].sum().backward()
         rows, columns = probe.grad.abs().sum((0, 1)).nonzero().T
         assert max((rows - centre).abs().max(), (columns - centre).abs().max()) <= net.receptive_radius
@@ -102,7 +102,7 @@ def test_freezing_on_the_image_itself_changes_nothing_and_ends_with_the_context(
     image, other = torch.randn(2, 1, 4, 16, 16)
     with torch.no_grad():
         plain, plain_other = net(image), net(other)
-        with frozen_pooling(net, lambda: net(image)):
+        with frozen_pooling(net, pooling(net, lambda: net(image))):
             torch.testing.assert_close(net(image), plain)
             assert (net(other) - plain_other).abs().max() > 1e-5
         torch.testing.assert_close(net(other), plain_other, rtol=0, atol=0)

@@ -18,53 +18,83 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
-import torch
 
-from fsid.denoise.model import Denoiser
-from fsid.denoise.nafnet import frozen_pooling
+from fsid.denoise.model import ModelCard
 from fsid.errors import FsidError
 from fsid.sensor.mosaic import pack, site_offsets, unpack
 from fsid.sensor.raw import NoiseLevel, Raw
 
-TILE_PX = 256  # packed pixels: some 100 MB of activations for the small networks
+TILE_PX = 512  # packed pixels: some 500 MB of activations for the small networks
 _POOLING_PATCHES = 16
 _WHOLE_UP_TO = 2  # image sides, in training patches, up to which it is pooled as a whole
 
 Progress = Callable[[int, int], None]
 
 
+class Network(Protocol):
+    """What runs the tiles: PyTorch (`Denoiser`) or onnxruntime (`OnnxDenoiser`); both mean the same."""
+
+    @property
+    def card(self) -> ModelCard: ...
+
+    @property
+    def multiple(self) -> int: ...
+
+    @property
+    def receptive_radius(self) -> int: ...
+
+    def averages(self, patch: np.ndarray, level: NoiseLevel) -> np.ndarray: ...
+
+    def run(self, tile: np.ndarray, level: NoiseLevel, averages: np.ndarray) -> np.ndarray: ...
+
+
 def denoise_raw(
     raw: Raw,
-    model: Denoiser,
+    model: Network,
     level: NoiseLevel | None = None,
     *,
+    strength: float = 1.0,
     tile_px: int = TILE_PX,
     progress: Progress | None = None,
 ) -> Raw:
     """The clean estimate of `raw`, all metadata kept, `noise` None (what is left no longer follows the law).
 
-    level: noise of `raw`; None takes `raw.noise`. tile_px: side of a tile in packed pixels, overlap excluded;
-    memory grows with it, the result does not depend on it. progress(done, tiles) is called after each tile.
-    Raises FsidError where the noise level is unknown or not physical, or the mosaic holds NaN or infinity.
+    level: noise of `raw`; None takes `raw.noise`. strength: 0..1 is the share of the noise's amplitude that
+    is removed, so that grain is left below 1; above 1 the noise is taken to be that many times as strong,
+    which smooths more. tile_px: side of a tile in packed pixels, overlap excluded; memory grows with it, the
+    result does not depend on it. progress(done, tiles) is called after each tile. Raises FsidError where the
+    noise level is unknown or not physical, the strength negative, or the mosaic holds NaN or infinity.
     """
     level = level if level is not None else raw.noise
-    _check(raw, level, tile_px)
+    _check(raw, level, strength, tile_px)
     assert level is not None
+    if strength > 1:
+        level = NoiseLevel(_times(level.k, strength**2), _times(level.sigma2, strength**2))
     row, column = site_offsets(raw.cfa)[0]
     height, width = raw.mosaic.shape
-    stride = model.net.net.multiple
+    stride = model.multiple
     bottom, right = -(height + row) % (2 * stride), -(width + column) % (2 * stride)
     aligned = np.pad(raw.mosaic, ((row, bottom), (column, right)), mode="reflect")
     packed = pack(aligned.astype(np.float32, copy=False), "RGGB")
     del aligned
     clean = _denoise_packed(packed, model, level, tile_px, progress)
-    mosaic = unpack(clean, "RGGB")[row : row + height, column : column + width]
-    return replace(raw, mosaic=np.ascontiguousarray(mosaic), noise=None)
+    del packed
+    mosaic = np.ascontiguousarray(unpack(clean, "RGGB")[row : row + height, column : column + width])
+    if strength < 1:
+        mosaic *= np.float32(strength)
+        mosaic += np.float32(1 - strength) * raw.mosaic
+    return replace(raw, mosaic=mosaic, noise=None)
 
 
-def _check(raw: Raw, level: NoiseLevel | None, tile_px: int) -> None:
+def _times(values: tuple[float, float, float, float], factor: float) -> tuple[float, float, float, float]:
+    a, b, c, d = (factor * value for value in values)
+    return a, b, c, d
+
+
+def _check(raw: Raw, level: NoiseLevel | None, strength: float, tile_px: int) -> None:
     if level is None:
         raise FsidError(
             "the noise level of this RAW is unknown: give a profile and an ISO (--profile, --iso)"
@@ -73,34 +103,27 @@ def _check(raw: Raw, level: NoiseLevel | None, tile_px: int) -> None:
         raise FsidError(f"noise level {level}: k and sigma2 must be finite and not negative")
     if not np.all(np.isfinite(raw.mosaic)):
         raise FsidError("this RAW holds NaN or infinity; read it again from its file")
+    if not 0 <= strength < np.inf:
+        raise FsidError(f"strength {strength}: must be 0 (nothing is removed) or more; 1 removes the noise")
     if tile_px < 1:
         raise FsidError(f"tile_px {tile_px}: must be at least 1")
 
 
-@torch.no_grad()
 def _denoise_packed(
-    packed: np.ndarray, model: Denoiser, level: NoiseLevel, tile_px: int, progress: Progress | None
+    packed: np.ndarray, model: Network, level: NoiseLevel, tile_px: int, progress: Progress | None
 ) -> np.ndarray:
     """packed (4, H, W), H and W multiples of the network's stride -> (4, H, W)."""
-
-    def run(patch: np.ndarray) -> np.ndarray:
-        k, sigma2 = (
-            torch.tensor([v], dtype=torch.float32, device=model.device) for v in (level.k, level.sigma2)
-        )
-        return model.net(torch.from_numpy(patch)[None].to(model.device), k, sigma2)[0].cpu().numpy()
-
-    stride, radius = model.net.net.multiple, model.net.net.receptive_radius
+    stride, radius = model.multiple, model.receptive_radius
     tile, overlap = (-(-length // stride) * stride for length in (tile_px, radius))
     rows, columns = (_tiles(length, tile, overlap) for length in packed.shape[1:])
     out = np.empty_like(packed)
-    with frozen_pooling(
-        model.net, lambda: [run(patch) for patch in _pooling_patches(packed, model.card.patch_px)]
-    ):
-        for done, (row, column) in enumerate((r, c) for r in rows for c in columns):
-            patch = run(np.ascontiguousarray(packed[:, row.seen, column.seen]))
-            out[:, row.kept, column.kept] = patch[:, row.inside, column.inside]
-            if progress is not None:
-                progress(done + 1, len(rows) * len(columns))
+    patches = _pooling_patches(packed, model.card.patch_px)
+    averages = np.mean([model.averages(patch, level) for patch in patches], axis=0)
+    for done, (row, column) in enumerate((r, c) for r in rows for c in columns):
+        clean = model.run(np.ascontiguousarray(packed[:, row.seen, column.seen]), level, averages)
+        out[:, row.kept, column.kept] = clean[:, row.inside, column.inside]
+        if progress is not None:
+            progress(done + 1, len(rows) * len(columns))
     return out
 
 

@@ -10,20 +10,25 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 from torch import Tensor
 
 from fsid.config import from_plain, to_plain
+from fsid.denoise.nafnet import NAFBlock, frozen_pooling, pooling
 from fsid.denoise.raw_denoiser import NetworkConfig, RawDenoiser
 from fsid.errors import FsidError
 from fsid.files import write_atomically
+from fsid.sensor import NoiseLevel
 
 MODEL_FILE = "model.safetensors"  # inside a run folder
+DEFAULT_MODEL = "nafnet-small"  # a file of the folder `weights`
 _CARD = "fsid_card"
 
 
@@ -43,11 +48,42 @@ class ModelCard:
 
 @dataclass(frozen=True)
 class Denoiser:
-    """A network ready for use, in evaluation mode on `device`."""
+    """A network ready for use, in evaluation mode on `device`; the tiles of `denoise_raw` run through it."""
 
     net: RawDenoiser
     card: ModelCard
     device: torch.device
+
+    @property
+    def multiple(self) -> int:
+        """What height and width of an input must be multiples of, in packed pixels."""
+        return self.net.net.multiple
+
+    @property
+    def receptive_radius(self) -> int:
+        """How far an output reaches once the averages are given, in packed pixels."""
+        return self.net.net.receptive_radius
+
+    @torch.no_grad()
+    def averages(self, patch: np.ndarray, level: NoiseLevel) -> np.ndarray:
+        """The averages that channel attention takes over `patch` (4, h, w), one after the other: (n,)."""
+        seen = pooling(self.net, lambda: self.net(*self._inputs(patch, level)))
+        return torch.cat([mean.flatten() for mean in seen] or [torch.zeros(0)]).cpu().numpy()
+
+    @torch.no_grad()
+    def run(self, tile: np.ndarray, level: NoiseLevel, averages: np.ndarray) -> np.ndarray:
+        """The clean estimate (4, h, w) of `tile` with channel attention held at `averages` (n,)."""
+        widths = [len(block.norm1.weight) for block in self.net.modules() if isinstance(block, NAFBlock)]
+        parts = torch.from_numpy(averages).to(self.device).split(widths)
+        with frozen_pooling(self.net, [part[None, :, None, None] for part in parts]):
+            return self.net(*self._inputs(tile, level))[0].cpu().numpy()
+
+    def _inputs(self, packed: np.ndarray, level: NoiseLevel) -> tuple[Tensor, Tensor, Tensor]:
+        image = torch.from_numpy(packed)[None].to(self.device)
+        k, sigma2 = (
+            torch.tensor([v], dtype=torch.float32, device=self.device) for v in (level.k, level.sigma2)
+        )
+        return image, k, sigma2
 
 
 def save_model(
@@ -63,14 +99,25 @@ def save_model(
     write_atomically(path.with_suffix(".json"), readable.encode())
 
 
-def load_model(run_or_file: str | Path, device: str | torch.device = "cpu") -> Denoiser:
-    """Load a run folder's network or a .safetensors file.
-
-    Raises FsidError where it is missing, broken, not a network of FSID, or does not fit its own card.
-    """
+def model_path(run_or_file: str | Path | None) -> Path:
+    """The file of a network: of a run folder, a shipped one by its name, a file; None is `DEFAULT_MODEL`."""
+    name = str(run_or_file or DEFAULT_MODEL)
+    shipped = Path(str(files("fsid.denoise") / "weights" / f"{name}.safetensors"))
+    if shipped.is_file():
+        return shipped
+    if run_or_file is None:
+        raise FsidError("no network ships with this version of FSID; give one with --model RUN or FILE")
     path = Path(run_or_file)
-    if path.is_dir():
-        path = path / MODEL_FILE
+    return path / MODEL_FILE if path.is_dir() else path
+
+
+def load_model(run_or_file: str | Path | None = None, device: str | torch.device = "cpu") -> Denoiser:
+    """Load a run folder's network, a .safetensors file, or a shipped network by name; None: the default one.
+
+    Weights may be stored in half precision; they are used in single. Raises FsidError where the file is
+    missing, broken, not a network of FSID, or does not fit its own card.
+    """
+    path = model_path(run_or_file)
     weights, header = read_tensors(
         path, "a model: give a run folder of `fsid train` or its model.safetensors"
     )

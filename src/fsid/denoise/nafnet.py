@@ -16,7 +16,7 @@ there on a CPU, and the layer norm over channels becomes the fused norm over the
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 import torch
@@ -147,23 +147,31 @@ def _receptive_radius(encoder: tuple[int, ...], middle: int, decoder: tuple[int,
     return radius + 2
 
 
-@contextmanager
-def frozen_pooling(net: nn.Module, run: Callable[[], object]) -> Iterator[None]:
-    """Inside this context every spatial mean of `net` is constant: its average while `run()` ran.
+def spatial_means(net: nn.Module) -> list[SpatialMean]:
+    """All of them, in the order in which the blocks were made."""
+    return [module for module in net.modules() if isinstance(module, SpatialMean)]
 
-    run: feeds the representative patches through `net`, in as many calls of equal batch size as it likes.
-    """
-    means = [module for module in net.modules() if isinstance(module, SpatialMean)]
-    seen: dict[SpatialMean, list[Tensor]] = {mean: [] for mean in means}
-    hooks = [mean.register_forward_hook(lambda m, _, out: seen[m].append(out)) for mean in means]
+
+def pooling(net: nn.Module, run: Callable[[], object]) -> list[Tensor]:
+    """What the spatial means of `net` gave during the one call in `run()`, (B, C, 1, 1) each."""
+    means = spatial_means(net)
+    seen: dict[SpatialMean, Tensor] = {}
+    hooks = [mean.register_forward_hook(lambda m, _, out: seen.update({m: out})) for mean in means]
     try:
         run()
     finally:
         for hook in hooks:
             hook.remove()
+    return [seen[mean] for mean in means]
+
+
+@contextmanager
+def frozen_pooling(net: nn.Module, constants: Sequence[Tensor]) -> Iterator[None]:
+    """Inside this context the spatial means of `net` are `constants`, (1, C, 1, 1) each, see `pooling`."""
+    means = spatial_means(net)
     try:
-        for mean in means:
-            mean.frozen = torch.cat(seen[mean]).mean(0, keepdim=True)
+        for mean, constant in zip(means, constants, strict=True):
+            mean.frozen = constant
         yield
     finally:
         for mean in means:
