@@ -21,7 +21,8 @@ def evaluate(
 ) -> None:
     """Measure the noisy input, a classical denoiser and models: RAW PSNR, and PSNR and SSIM after develop.
 
-    Prints one table per set. With -o, writes results.json and report.html (tables, plot, crops).
+    Prints one table per set. With -o, writes results.json, images.csv (every image) and report.html
+    (tables, plot, before and after, error maps).
 
     Args:
         testset: Folder made by fsid testset.

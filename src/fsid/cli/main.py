@@ -17,6 +17,7 @@ from fsid.cli import (
     develop,
     doctor,
     evaluate,
+    experiment,
     generate,
     inspect,
     preview,
@@ -39,6 +40,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "develop": develop.develop,
     "testset": testset.testset,
     "evaluate": evaluate.evaluate,
+    "experiment": experiment.experiment,
     "demo": demo.demo,
     "doctor": doctor.doctor,
 }

@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal
 
+from rich.console import Console
+from rich.table import Table
 from tyro.conf import Positional
 
 from fsid.cli.arguments import Output
@@ -14,33 +16,86 @@ DEFAULT_ISOS = (800, 1600, 3200, 6400)
 
 
 def testset(
-    source: Positional[Literal["photos"]],
-    folders: Positional[tuple[Path, ...]],
+    source: Positional[Literal["photos", "simulate", "from-bursts"]],
+    folders: Positional[tuple[Path, ...]] = (),
     *,
     output: Output,
-    camera: str = "pixel6",
+    camera: str = "",
     iso: tuple[int, ...] = (),
     lux: tuple[float, ...] = (),
+    frames: int = 1,
+    scenes: int = 3,
+    width: int = 1024,
+    height: int = 768,
+    material: tuple[str, ...] = (),
     seed: int = 0,
     quiet: bool = False,
 ) -> None:
-    """Make a RAW test set: a truth per image, and one noisy capture per light level.
+    """Make a RAW test set: a truth per image, and noisy captures per light level.
 
     Args:
-        source: "photos": photographs are unprocessed to RAW and given a camera's noise.
-        folders: Folders of photographs; the name of a folder becomes the name of its set.
+        source: "photos": photographs are unprocessed to RAW and given a camera's noise. "simulate": the ten
+            test materials of the paper are drawn and lit. "from-bursts": truth and captures from your own
+            bursts, FOLDER/<scene>/<level>/*.dng.
+        folders: Folders of photographs (the name of a folder becomes the name of its set), or the one folder
+            of bursts; none for "simulate".
         output: Folder of the test set.
-        camera: Noise profile, a built-in name (fsid profiles) or a file.
-        iso: ISO of each light level (800 1600 3200 6400 where neither ISO nor lux is given).
-        lux: Light levels in lux: auto-exposure of the camera (exposures up to 1/10 s) makes them ISOs.
-        seed: Seed of white balance, colour matrix and noise.
+        camera: Noise profile, a built-in name (fsid profiles) or a file (default pixel6; for from-bursts the
+            noise in the files, or an estimate).
+        iso: ISO of each light level (photos: 800 1600 3200 6400 where neither ISO nor lux is given).
+        lux: Light levels in lux: auto-exposure of the camera (exposures up to 1/10 s) makes them ISOs
+            (simulate: 0.5 1 2 5 where neither is given).
+        frames: Noisy frames per image and level (simulate, from-bursts).
+        scenes: Pictures per material (simulate).
+        width: Width of a picture in pixels (simulate).
+        height: Height of a picture in pixels (simulate).
+        material: Materials to draw (simulate; default all ten).
+        seed: Seed of drawing, white balance, colour matrix and noise.
         quiet: No progress bar.
     """
     from fsid.errors import FsidError
-    from fsid.evaluate import photo_testset
+    from fsid.evaluate import burst_testset, photo_testset, simulated_testset
 
+    if source == "simulate":
+        if folders:
+            raise FsidError(f"fsid testset simulate: takes no folder, but {folders[0]} was given")
+        with progress_bar("materials", "pictures", quiet=quiet) as progress:
+            simulated_testset(
+                output,
+                camera=camera or "pixel6",
+                luxes=lux,
+                isos=iso,
+                materials=material,
+                frames=frames,
+                scenes=scenes,
+                width=width,
+                height=height,
+                seed=seed,
+                progress=progress,
+            )
+        return
     if not folders:
-        raise FsidError("fsid testset photos: name at least one folder of photographs")
+        raise FsidError(f"fsid testset {source}: name at least one folder")
+    if source == "from-bursts":
+        if len(folders) > 1:
+            raise FsidError("fsid testset from-bursts: give one folder, <scene>/<level>/frames inside")
+        with progress_bar("bursts", "bursts", quiet=quiet) as progress:
+            _, found = burst_testset(folders[0], output, camera=camera, frames=frames, progress=progress)
+        table = Table("burst", "frames", "left out", "outliers", "flicker", "shift px", "truth PSNR dB")
+        for q in found:
+            table.add_row(
+                f"{q.image}/{q.level}",
+                str(q.frames),
+                str(q.left_out),
+                f"{q.outliers:.3%}",
+                f"{q.flicker:.2%}",
+                f"{q.shift_px:.0f}",
+                f"{q.psnr:.1f}",
+            )
+        Console().print(table)
+        return
     isos = iso if iso or lux else DEFAULT_ISOS
     with progress_bar("photographs", "photographs", quiet=quiet) as progress:
-        photo_testset(folders, output, camera=camera, isos=isos, luxes=lux, seed=seed, progress=progress)
+        photo_testset(
+            folders, output, camera=camera or "pixel6", isos=isos, luxes=lux, seed=seed, progress=progress
+        )

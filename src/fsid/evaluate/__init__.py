@@ -3,9 +3,11 @@
 `models` and `demo` need PyTorch and are imported by name; the rest runs without it.
 """
 
+from fsid.evaluate.bursts import TruthQuality, burst_testset
 from fsid.evaluate.classical import denoise_classical
 from fsid.evaluate.compare import CLASSICAL, NOISY, Comparison, Method, Row, compare, write_results
 from fsid.evaluate.metrics import psnr, ssim
+from fsid.evaluate.simulated import simulated_testset
 from fsid.evaluate.testset import TestImage, TestSet, photo_testset, read_testset
 
 __all__ = [
@@ -16,11 +18,14 @@ __all__ = [
     "Row",
     "TestImage",
     "TestSet",
+    "TruthQuality",
+    "burst_testset",
     "compare",
     "denoise_classical",
     "photo_testset",
     "psnr",
     "read_testset",
+    "simulated_testset",
     "ssim",
     "write_results",
 ]

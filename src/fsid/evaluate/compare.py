@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import csv
 import json
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, astuple, dataclass, fields
 from itertools import product
 from pathlib import Path
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
+from scipy.stats import t
 
 from fsid.errors import FsidError
 from fsid.evaluate.classical import denoise_classical
@@ -43,6 +45,19 @@ class Row:
 
 
 @dataclass(frozen=True)
+class ImageRow:
+    """One image at one level under one method: the mean over its noisy frames; dB, dB, 0..1."""
+
+    model: str
+    level: str
+    set: str
+    image: str
+    psnr_raw: float
+    psnr: float
+    ssim: float
+
+
+@dataclass(frozen=True)
 class Crops:
     """A window of one image at one level, developed: (h, w, 3) sRGB 0..1, by method name."""
 
@@ -54,10 +69,11 @@ class Crops:
 
 @dataclass(frozen=True)
 class Comparison:
-    """All rows, and the crops that were asked for."""
+    """All rows, those of the single images, and the crops that were asked for."""
 
     testset: TestSet
     rows: tuple[Row, ...]
+    images: tuple[ImageRow, ...]
     crops: tuple[Crops, ...]
 
 
@@ -85,33 +101,37 @@ def compare(
         raise FsidError("two models have the same name; copy one to another folder name")
     if unknown := set(crop_levels) - set(testset.levels):
         raise FsidError(f"{root}: has no level {', '.join(sorted(unknown))}")
-    figures: dict[tuple[str, str, str], list[tuple[float, float, float]]] = {}
+    images: list[ImageRow] = []
     crops = []
     tasks = list(product(testset.images, testset.levels))
     for done, (image, level) in enumerate(tasks):
         progress(done, len(tasks))
-        truth = read_raw(testset.clean(root, image))
-        noisy = read_raw(testset.noisy(root, image, level))
-        if truth.mosaic.shape != noisy.mosaic.shape or truth.cfa != noisy.cfa:
-            raise FsidError(f"{testset.noisy(root, image, level)}: size or CFA differs from its clean.dng")
+        truth = read_raw(testset.clean(root, image, level))
         developed_truth = develop(truth)
+        frames = [_noisy(testset.noisy(root, image, level, n), truth) for n in range(testset.frames)]
         outputs = {}
         for method in methods:
-            output = method.denoise(noisy)
-            developed = develop(output)
-            outputs[method.name] = developed
-            figures.setdefault((method.name, level, image.set), []).append(
-                (
-                    psnr(output.mosaic, truth.mosaic),
-                    psnr(developed, developed_truth),
-                    ssim(developed, developed_truth),
-                )
-            )
+            results = [method.denoise(frame) for frame in frames]
+            developed = [develop(result) for result in results]
+            outputs[method.name] = developed[0]
+            figures = [
+                (psnr(r.mosaic, truth.mosaic), psnr(d, developed_truth), ssim(d, developed_truth))
+                for r, d in zip(results, developed, strict=True)
+            ]
+            mean = map(float, np.mean(figures, axis=0))
+            images.append(ImageRow(method.name, level, image.set, image.name, *mean))
         if level in crop_levels:
-            raw_psnr = {m.name: figures[m.name, level, image.set][-1][0] for m in methods}
+            raw_psnr = {row.model: row.psnr_raw for row in images[-len(methods) :]}
             crops.append(_crops(image, level, developed_truth, outputs, raw_psnr, crop_px))
     progress(len(tasks), len(tasks))
-    return Comparison(testset, tuple(_rows(testset, methods, figures)), tuple(crops))
+    return Comparison(testset, tuple(summarise(testset, methods, images)), tuple(images), tuple(crops))
+
+
+def _noisy(path: Path, truth: Raw) -> Raw:
+    noisy = read_raw(path)
+    if truth.mosaic.shape != noisy.mosaic.shape or truth.cfa != noisy.cfa:
+        raise FsidError(f"{path}: size or CFA differs from its clean.dng")
+    return noisy
 
 
 def detailed_window(srgb: np.ndarray, size_px: int) -> tuple[tuple[slice, slice], float]:
@@ -138,21 +158,39 @@ def write_results(rows: Sequence[Row], file: Path) -> None:
     file.write_text(json.dumps(plain, indent=1) + "\n", encoding="utf-8")
 
 
-def _rows(
-    testset: TestSet,
-    methods: Sequence[Method],
-    figures: dict[tuple[str, str, str], list[tuple[float, float, float]]],
-) -> Iterator[Row]:
-    sets = sorted({image.set for image in testset.images})
-    for method, level in product(methods, testset.levels):
-        by_set = {name: figures[method.name, level, name] for name in sets}
-        if len(sets) > 1:
-            by_set[ALL_SETS] = [triple for triples in by_set.values() for triple in triples]
-        for name, triples in by_set.items():
-            mean = np.mean(triples, axis=0)
-            yield Row(
-                method.name, method.training, testset.camera, level, name, len(triples), *map(float, mean)
-            )
+def write_images(images: Sequence[ImageRow], file: Path) -> None:
+    """Write images.csv: one line per image, level and method."""
+    with file.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(field.name for field in fields(ImageRow))
+        for row in images:
+            writer.writerow(f"{v:.4f}" if isinstance(v, float) else v for v in astuple(row))
+
+
+def confidence(values: Sequence[float]) -> float:
+    """Half width of the 95 % confidence interval of the mean (Student's t); NaN of fewer than two values."""
+    if len(values) < 2:
+        return float("nan")
+    return float(t.ppf(0.975, len(values) - 1) * np.std(values, ddof=1) / np.sqrt(len(values)))
+
+
+def summarise(testset: TestSet, methods: Sequence[Method], images: Sequence[ImageRow]) -> list[Row]:
+    """The means over each set of `testset`, and over all where there are several, from `images`."""
+    sets = list(dict.fromkeys(image.set for image in testset.images))
+    names = [*sets, ALL_SETS] if len(sets) > 1 else sets
+    members = {(image.set, image.name) for image in testset.images}
+    rows = []
+    for method, level, name in product(methods, testset.levels, names):
+        triples = [
+            (row.psnr_raw, row.psnr, row.ssim)
+            for row in images
+            if (row.model, row.level) == (method.name, level)
+            and (row.set, row.image) in members
+            and name in (row.set, ALL_SETS)
+        ]
+        mean = map(float, np.mean(triples, axis=0))
+        rows.append(Row(method.name, method.training, testset.camera, level, name, len(triples), *mean))
+    return rows
 
 
 def _crops(

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from fsid.denoise import denoise_raw, load_model
 from fsid.errors import FsidError
-from fsid.evaluate.compare import CLASSICAL, NOISY, Comparison, Method, compare, write_results
+from fsid.evaluate.compare import CLASSICAL, NOISY, Comparison, Method, compare, write_images, write_results
 from fsid.evaluate.report import comparison_sections, write_report
 from fsid.evaluate.testset import read_testset
 
@@ -25,7 +25,7 @@ def evaluate_models(
     *,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Comparison:
-    """Compare the baselines and `models`; writes results.json and report.html into `out` unless None."""
+    """Compare the baselines and `models`; writes results.json, images.csv, report.html into `out`."""
     levels = read_testset(testset).levels
     methods = [NOISY, CLASSICAL, *(model_method(path, path.resolve().stem) for path in models)]
     if out is not None:
@@ -33,6 +33,7 @@ def evaluate_models(
     comparison = compare(testset, methods, crop_levels=levels[len(levels) // 2 :][:1], progress=progress)
     if out is not None:
         write_results(comparison.rows, out / "results.json")
+        write_images(comparison.images, out / "images.csv")
         lead = f"{len(comparison.testset.images)} images, {len(levels)} levels. {comparison.testset.notes}."
         write_report(out / "report.html", f"FSID: {testset.name}", lead, comparison_sections(comparison))
     return comparison

@@ -16,9 +16,11 @@ from PIL import Image
 
 from fsid import __version__
 from fsid.dataset import to_uint8
-from fsid.evaluate.compare import Comparison, Crops
+from fsid.evaluate.classical import bm3d_installed
+from fsid.evaluate.compare import ALL_SETS, Comparison, Crops, Row, confidence
 
-METHOD_NAMES = {"noisy": "noisy input", "classical": "classical (VST + non-local means)"}
+ERROR_GAIN = 8.0
+"""Error maps show |output - truth| of the developed pictures this many times."""
 
 
 @dataclass(frozen=True)
@@ -28,6 +30,14 @@ class Picture:
     uri: str
     caption: str = ""
     pixelated: bool = False
+
+
+@dataclass(frozen=True)
+class Slider:
+    """Two pictures of equal size, one above the other, with a draggable border between them."""
+
+    before: Picture
+    after: Picture
 
 
 @dataclass(frozen=True)
@@ -41,12 +51,13 @@ class Table:
 
 @dataclass(frozen=True)
 class Section:
-    """A heading with, in this order, text, tables and rows of pictures."""
+    """A heading with, in this order, text, tables, rows of pictures and rows of sliders."""
 
     title: str
     text: str = ""
     tables: tuple[Table, ...] = ()
     pictures: tuple[tuple[Picture, ...], ...] = ()
+    sliders: tuple[tuple[Slider, ...], ...] = ()
 
 
 def write_report(file: Path, title: str, lead: str, sections: Sequence[Section]) -> None:
@@ -78,25 +89,33 @@ def comparison_sections(comparison: Comparison) -> list[Section]:
     sets = list(dict.fromkeys(row.set for row in rows))
     tables = tuple(_table(comparison, name) for name in sets)
     n = {row.set: row.n for row in rows}
-    text = "PSNR in dB in RAW, then PSNR and SSIM after develop; means over images. " + " ".join(
-        f"Table {i}: {name}, {n[name]} images." for i, name in enumerate(sets, 1)
-    )
+    text = (
+        "PSNR in dB in RAW, then PSNR and SSIM after develop; means over images, with the half width of the "
+        "95 % confidence interval of the RAW PSNR. "
+    ) + " ".join(f"Table {i}: {name}, {n[name]} images." for i, name in enumerate(sets, 1))
     figures = Section(
         f"Figures on {comparison.testset.camera}", text, tables, ((_level_plot(comparison, sets[-1]),),)
     )
     if not comparison.crops:
         return [figures]
+    before_after = Section(
+        "Before and after",
+        "Drag the border. Left of it the noisy input, right of it the last method of the tables.",
+        sliders=tuple(_chunks([_slider(crops) for crops in comparison.crops], 3)),
+    )
     side_by_side = Section(
         "Side by side",
-        "The window of each image with the most detail, developed. Figures: RAW PSNR of the whole image.",
-        pictures=tuple(_crop_row(crops) for crops in comparison.crops),
+        "The window of each image with the most detail, developed. Figures: RAW PSNR of the whole image. "
+        f"Below each: its error against the truth, {ERROR_GAIN:g} times.",
+        pictures=tuple(row for crops in comparison.crops for row in (_crop_row(crops), _error_row(crops))),
     )
-    return [figures, side_by_side]
+    return [figures, before_after, side_by_side]
 
 
 def method_label(name: str) -> str:
     """How a method is called in tables and captions."""
-    return METHOD_NAMES.get(name, name)
+    smoother = "BM3D" if bm3d_installed() else "non-local means"
+    return {"noisy": "noisy input", "classical": f"classical (VST + {smoother})"}.get(name, name)
 
 
 def _table(comparison: Comparison, set_name: str) -> Table:
@@ -107,15 +126,23 @@ def _table(comparison: Comparison, set_name: str) -> Table:
     body, best = [], set()
     for i, method in enumerate(methods):
         cells = [rows[method, level] for level in levels]
-        body.append(
-            (method_label(method), *(f"{c.psnr_raw:.2f} / {c.psnr:.2f} / {c.ssim:.3f}" for c in cells))
-        )
+        body.append((method_label(method), *(_cell(comparison, cell) for cell in cells)))
         best |= {
             (i, j)
             for j, cell in enumerate(cells, 1)
             if cell.psnr_raw == max(rows[other, cell.level].psnr_raw for other in methods)
         }
     return Table(head, tuple(body), frozenset(best))
+
+
+def _cell(comparison: Comparison, row: Row) -> str:
+    values = [
+        image.psnr_raw
+        for image in comparison.images
+        if (image.model, image.level) == (row.model, row.level) and row.set in (image.set, ALL_SETS)
+    ]
+    interval = f" ± {confidence(values):.2f}" if len(values) > 1 else ""
+    return f"{row.psnr_raw:.2f}{interval} / {row.psnr:.2f} / {row.ssim:.3f}"
 
 
 def _level_plot(comparison: Comparison, set_name: str) -> Picture:
@@ -142,6 +169,27 @@ def _crop_row(crops: Crops) -> tuple[Picture, ...]:
         for name, pixels in crops.by_method.items()
     ]
     return (*outputs, picture(crops.truth, f"truth: {crops.title}", pixelated=True))
+
+
+def _error_row(crops: Crops) -> tuple[Picture, ...]:
+    maps = [
+        picture(ERROR_GAIN * np.abs(pixels - crops.truth), f"error of {method_label(name)}", pixelated=True)
+        for name, pixels in crops.by_method.items()
+    ]
+    return (*maps, picture(np.zeros_like(crops.truth), "no error", pixelated=True))
+
+
+def _slider(crops: Crops) -> Slider:
+    names = list(crops.by_method)
+    before, after = (
+        picture(crops.by_method[name], f"{crops.title}: {method_label(name)}", pixelated=True)
+        for name in (names[0], names[-1])
+    )
+    return Slider(before, after)
+
+
+def _chunks(items: Sequence[Slider], size: int) -> list[tuple[Slider, ...]]:
+    return [tuple(items[i : i + size]) for i in range(0, len(items), size)]
 
 
 def _uri(png: bytes) -> str:

@@ -1,8 +1,10 @@
-"""Test sets: a truth and its noisy captures, per image and light level, as DNG files.
+"""Test sets: truths and their noisy captures, per image and light level, as DNG files.
 
     DIR/testset.json                      camera, levels and the list of images
     DIR/<image>/clean.dng                 the truth
+    DIR/<image>/<level>.clean.dng         in its place where the truth differs from level to level
     DIR/<image>/<level>.noisy.dng         what the camera saw, for example iso3200.noisy.dng
+    DIR/<image>/<level>.noisy.01.dng ...  further frames of the same burst
 
 A level is a name such as "iso3200"; the noise level of each capture is in its DNG `NoiseProfile`.
 """
@@ -15,6 +17,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,6 +25,8 @@ from fsid.config import from_plain, to_plain
 from fsid.dataset import find_photos, read_photo
 from fsid.errors import FsidError
 from fsid.sensor import (
+    CameraProfile,
+    Raw,
     clean_from_photo,
     clean_levels,
     light_level,
@@ -29,6 +34,8 @@ from fsid.sensor import (
     noisy_from_clean,
     write_dng,
 )
+
+Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
@@ -43,7 +50,7 @@ class TestImage:
 
 @dataclass(frozen=True)
 class TestSet:
-    """The content of testset.json. iso: per level, in the order of `levels`."""
+    """The content of testset.json. frames: noisy captures per image and level."""
 
     __test__ = False
 
@@ -52,14 +59,17 @@ class TestSet:
     images: tuple[TestImage, ...]
     seed: int
     notes: str
+    frames: int = 1
 
-    def clean(self, root: Path, image: TestImage) -> Path:
-        """Path of the truth of `image`."""
-        return root / image.name / "clean.dng"
+    def clean(self, root: Path, image: TestImage, level: str = "") -> Path:
+        """Path of the truth of `image` (at `level`)."""
+        own = root / image.name / f"{level}.clean.dng"
+        return own if own.exists() else root / image.name / "clean.dng"
 
-    def noisy(self, root: Path, image: TestImage, level: str) -> Path:
-        """Path of the capture of `image` at `level`."""
-        return root / image.name / f"{level}.noisy.dng"
+    def noisy(self, root: Path, image: TestImage, level: str, frame: int = 0) -> Path:
+        """Path of a capture of `image` at `level`."""
+        suffix = f".{frame:02d}" if frame else ""
+        return root / image.name / f"{level}.noisy{suffix}.dng"
 
 
 def read_testset(root: Path) -> TestSet:
@@ -87,7 +97,7 @@ def photo_testset(
     isos: Sequence[int],
     luxes: Sequence[float] = (),
     seed: int = 0,
-    progress: Callable[[int, int], None] = lambda done, total: None,
+    progress: Progress = lambda done, total: None,
 ) -> TestSet:
     """Push photographs through a named camera: unprocess, mosaic, and one capture per ISO and light level.
 
@@ -97,35 +107,75 @@ def photo_testset(
     The set of an image is the name of its folder. Photograph i draws from SeedSequence(seed, spawn_key=(i,)).
     """
     profile = load_profile(camera)
-    if not (isos or luxes) or min((*isos, *luxes)) <= 0:
-        raise FsidError("--iso: at least one positive ISO (or --lux) is needed")
-    levels = {f"iso{iso}": float(iso) for iso in isos}
-    levels |= {f"{lux:g}lux": light_level(profile, lux, highest_iso=np.inf).iso for lux in luxes}
+    levels = levels_of(profile, isos, luxes)
     photos = [(folder.name, path) for folder in folders for path in find_photos(folder)]
-    images = tuple(TestImage(f"{i:04d}-{path.stem}", name) for i, (name, path) in enumerate(photos))
     testset = TestSet(
         camera=profile.name,
         levels=tuple(levels),
-        images=images,
+        images=tuple(TestImage(f"{i:04d}-{path.stem}", name) for i, (name, path) in enumerate(photos)),
         seed=seed,
         notes="photographs unprocessed to RAW (Brooks et al. 2019), noise from the camera's profile",
     )
-    with _staged(out) as root:
-        for i, (image, (_, path)) in enumerate(zip(images, photos, strict=True)):
-            rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(i,)))
-            clean = clean_from_photo(rng, read_photo(path), profile)
-            (root / image.name).mkdir()
-            write_dng(testset.clean(root, image), clean_levels(clean))
-            for level, iso in levels.items():
-                noisy = noisy_from_clean(rng, clean, iso, profile.level(iso), profile.terms)
-                write_dng(testset.noisy(root, image, level), noisy)
-            progress(i + 1, len(photos))
-        (root / "testset.json").write_text(json.dumps(to_plain(testset), indent=1) + "\n", encoding="utf-8")
+
+    def truth(rng: np.random.Generator, i: int) -> Raw:
+        return clean_from_photo(rng, read_photo(photos[i][1]), profile)
+
+    capture(testset, out, profile, levels, truth, progress)
     return testset
 
 
+class Setting(NamedTuple):
+    """What the camera is set to at a level; the exposure time matters for dark current only."""
+
+    iso: float
+    exposure_s: float
+
+
+def levels_of(profile: CameraProfile, isos: Sequence[int], luxes: Sequence[float]) -> dict[str, Setting]:
+    """The camera's setting at every level by name; FsidError where there is none or one is not positive."""
+    if not (isos or luxes) or min((*isos, *luxes)) <= 0:
+        raise FsidError("--iso: at least one positive ISO (or --lux) is needed")
+    levels = {f"iso{iso}": Setting(float(iso), 0.0) for iso in isos}
+    for lux in luxes:
+        light = light_level(profile, lux, highest_iso=np.inf)
+        levels[f"{lux:g}lux"] = Setting(light.iso, light.exposure_s)
+    return levels
+
+
+def capture(
+    testset: TestSet,
+    out: Path,
+    profile: CameraProfile,
+    levels: dict[str, Setting],
+    truth: Callable[[np.random.Generator, int], Raw],
+    progress: Progress,
+) -> None:
+    """Write a test set: truth(rng, i) of image i, and `testset.frames` captures of it at every level.
+
+    Image i draws from SeedSequence(testset.seed, spawn_key=(i,)).
+    """
+    with staged(out) as root:
+        for i, image in enumerate(testset.images):
+            rng = np.random.default_rng(np.random.SeedSequence(testset.seed, spawn_key=(i,)))
+            clean = truth(rng, i)
+            (root / image.name).mkdir()
+            write_dng(root / image.name / "clean.dng", clean_levels(clean))
+            for level, (iso, exposure_s) in levels.items():
+                noise = profile.level(iso)
+                for frame in range(testset.frames):
+                    noisy = noisy_from_clean(rng, clean, iso, noise, profile.terms, exposure_s=exposure_s)
+                    write_dng(testset.noisy(root, image, level, frame), noisy)
+            progress(i + 1, len(testset.images))
+        write_testset(root, testset)
+
+
+def write_testset(root: Path, testset: TestSet) -> None:
+    """Write testset.json."""
+    (root / "testset.json").write_text(json.dumps(to_plain(testset), indent=1) + "\n", encoding="utf-8")
+
+
 @contextmanager
-def _staged(out: Path) -> Iterator[Path]:
+def staged(out: Path) -> Iterator[Path]:
     """A folder beside `out` that becomes `out` when all is written, and vanishes where something fails."""
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise FsidError(f"{out}: exists already and is not empty; use another folder")

@@ -1,0 +1,250 @@
+"""A test set from captures: the truth is the robust mean of a burst, with its own error bar.
+
+    truth = mean_f clip(x_f / g_f),    clip: within 4 sigma of the first mean,    error = sigma / sqrt(F)
+
+    CAPTURES/<scene>/<level>/*.dng        one burst each: static scene, locked focus, exposure and ISO
+
+The first frames of a burst are the noisy test frames and stay out of the truth, else its noise would be
+theirs. g_f is the flicker of the light; a frame that moved is shifted back where the shift is a whole number
+of CFA tiles, and left out where it is not, since interpolating would blur the truth.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+
+import numpy as np
+from scipy.ndimage import uniform_filter
+from skimage.registration import phase_cross_correlation
+
+from fsid.errors import FsidError
+from fsid.evaluate.testset import Progress, TestImage, TestSet, staged, write_testset
+from fsid.sensor import NoiseLevel, Raw, clean_levels, estimate_noise, load_profile, pack, read_raw, write_dng
+
+OUTLIER_SIGMA = 4.0
+MAX_FLICKER = 0.2
+"""A frame whose brightness differs by more from the first is left out."""
+MAX_SUBPIXEL = 0.15
+"""Largest rest of a shift, in CFA tiles, that a frame of the truth may have."""
+MAX_SHIFT_TILES = 32
+LEAST_FRAMES = 3
+_PATCH_TILES = 7
+
+
+@dataclass(frozen=True)
+class TruthQuality:
+    """How good the truth of one burst is. frames: used; left_out: moved or flickering ones.
+
+    error: standard error of the truth, normalised; psnr: the best RAW PSNR that could be measured against it,
+    dB. outliers: share of samples left out. flicker: largest |g - 1|; shift_px: largest shift undone.
+    """
+
+    image: str
+    level: str
+    frames: int
+    left_out: int
+    error: float
+    psnr: float
+    outliers: float
+    flicker: float
+    shift_px: float
+
+
+@dataclass(frozen=True)
+class _Placed:
+    """Where a frame goes: roll by (rows, columns) pixels, then divide by the gain."""
+
+    path: Path
+    roll: tuple[int, int]
+    gain: float
+
+
+def burst_testset(
+    captures: Path,
+    out: Path,
+    *,
+    camera: str = "",
+    frames: int = 1,
+    progress: Progress = lambda done, total: None,
+) -> tuple[TestSet, list[TruthQuality]]:
+    """Make a test set of every burst below `captures`, and say how good its truths are (truth.csv in `out`).
+
+    camera: noise profile of the captures; "" takes the files' NoiseProfile, or estimates the noise of each
+    frame. frames: noisy frames per burst. Raises FsidError that names the burst at fault.
+    """
+    bursts = _find_bursts(captures, frames)
+    scenes = tuple(dict.fromkeys(scene for scene, _ in bursts))
+    levels = tuple(sorted({level for _, level in bursts}, key=_level_order))
+    for scene in scenes:
+        if missing := [level for level in levels if (scene, level) not in bursts]:
+            raise FsidError(f"{captures / scene}: has no burst {missing[0]}; every scene needs every level")
+    qualities = []
+    name = load_profile(camera).name if camera else ""
+    with staged(out) as root:
+        for done, ((scene, level), paths) in enumerate(bursts.items()):
+            progress(done, len(bursts))
+            (root / scene).mkdir(exist_ok=True)
+            truth, quality = average(paths[frames:], paths[0], scene, level)
+            write_dng(root / scene / f"{level}.clean.dng", clean_levels(truth))
+            for frame, path in enumerate(paths[:frames]):
+                raw = read_raw(path)
+                name = name or raw.camera
+                target = root / scene / f"{level}.noisy{f'.{frame:02d}' if frame else ''}.dng"
+                write_dng(target, replace(raw, noise=_noise(raw, camera)))
+            qualities.append(quality)
+        progress(len(bursts), len(bursts))
+        images = tuple(TestImage(scene, scene) for scene in scenes)
+        testset = TestSet(name, levels, images, 0, "captured bursts, truth by robust averaging", frames)
+        write_testset(root, testset)
+        (root / "truth.csv").write_text(_csv(qualities), encoding="utf-8")
+    return testset, qualities
+
+
+def average(
+    paths: Sequence[Path], reference: Path, image: str = "", level: str = ""
+) -> tuple[Raw, TruthQuality]:
+    """The robust mean of the frames at `paths`, placed on the frame `reference`; reads every file thrice."""
+    first = read_raw(reference)
+    placed = [p for p in (_place(path, first) for path in paths) if p is not None]
+    if len(placed) < LEAST_FRAMES:
+        raise FsidError(
+            f"{reference.parent}: only {len(placed)} of {len(paths)} frames lie still and have steady light; "
+            f"at least {LEAST_FRAMES} are needed. Use a tripod and a lamp that does not flicker"
+        )
+    mean, variance = _moments(placed)
+    sigma = np.sqrt(_spread_over_site(variance, first.cfa))
+    total, used, seen = np.zeros(mean.shape), np.zeros(mean.shape), 0
+    for x in _frames(placed):
+        kept = np.abs(x - mean) <= OUTLIER_SIGMA * sigma + 1e-9
+        total += np.where(kept, x, 0)
+        used += kept
+        seen += int(np.isfinite(x).sum())
+    truth = np.where(used > 0, total / np.maximum(used, 1), mean).astype(np.float32)
+    error = float(np.sqrt(np.mean(sigma.astype(np.float64) ** 2) / len(placed)))
+    quality = TruthQuality(
+        image=image,
+        level=level,
+        frames=len(placed),
+        left_out=len(paths) - len(placed),
+        error=error,
+        psnr=float(-20 * np.log10(max(error, 1e-9))),
+        outliers=float(1 - used.sum() / seen),
+        flicker=max(abs(p.gain - 1) for p in placed),
+        shift_px=float(max(np.hypot(*p.roll) for p in placed)),
+    )
+    return replace(first, mosaic=truth, noise=None), quality
+
+
+def _find_bursts(captures: Path, frames: int) -> dict[tuple[str, str], list[Path]]:
+    if not captures.is_dir():
+        raise FsidError(f"{captures}: is not a folder of captures")
+    found: dict[tuple[str, str], list[Path]] = {}
+    for folder in sorted(p for p in captures.glob("*/*") if p.is_dir()):
+        paths = sorted(p for p in folder.iterdir() if p.is_file() and not p.name.startswith("."))
+        if len(paths) < frames + LEAST_FRAMES:
+            raise FsidError(
+                f"{folder}: holds {len(paths)} frames; {frames} noisy and at least {LEAST_FRAMES} more for "
+                "the truth are needed (better 50)"
+            )
+        found[folder.parent.name, folder.name] = paths
+    if not found:
+        raise FsidError(
+            f"{captures}: holds no bursts; expected <scene>/<level>/frames, for example star/0.5lux/"
+        )
+    return found
+
+
+def _place(path: Path, first: Raw) -> _Placed | None:
+    """How a frame lies on the first; None where it moved by a part of a tile or flickered too much."""
+    raw = read_raw(path)
+    if raw.mosaic.shape != first.mosaic.shape or raw.cfa != first.cfa:
+        raise FsidError(f"{path}: size or CFA differs from the other frames of the burst")
+    if raw.iso != first.iso:
+        raise FsidError(f"{path}: ISO {raw.iso:g} differs from ISO {first.iso:g} of the burst's first frame")
+    ours, theirs = (_green(r) for r in (raw, first))
+    gain = float(ours.sum() / theirs.sum())
+    if not abs(gain - 1) <= MAX_FLICKER:
+        return None
+    whole, rest = _shift(ours, theirs)
+    if np.abs(rest).max() > MAX_SUBPIXEL or np.abs(whole).max() > MAX_SHIFT_TILES:
+        return None
+    return _Placed(path, (2 * int(whole[0]), 2 * int(whole[1])), gain)
+
+
+def _shift(ours: np.ndarray, theirs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rows and columns that `ours` must be rolled by, in tiles: whole ones, and what is left then.
+
+    Phase correlation finds the whole shift among many; the peak of the plain, windowed correlation then tells
+    the rest, which the phases of pure noise would blur.
+    """
+    whole = np.round(phase_cross_correlation(theirs, ours)[0]).astype(int)
+    window = np.hanning(ours.shape[0])[:, None] * np.hanning(ours.shape[1])
+    near = np.roll(ours, tuple(whole), axis=(0, 1))
+    a, b = ((plane - plane.mean()) * window for plane in (theirs, near))
+    rest = phase_cross_correlation(a, b, upsample_factor=20, normalization=None)[0]
+    return whole, rest
+
+
+def _green(raw: Raw) -> np.ndarray:
+    """(H/2, W/2) mean of the greens, lightly smoothed: noise has no place in finding a shift."""
+    packed = pack(raw.mosaic, raw.cfa)
+    return uniform_filter((packed[1] + packed[2]) / 2, 3)
+
+
+def _frames(placed: Sequence[_Placed]) -> Iterator[np.ndarray]:
+    """The frames in place, without flicker; NaN where a shifted frame has nothing."""
+    for p in placed:
+        x = np.roll(read_raw(p.path).mosaic, p.roll, axis=(0, 1)) / np.float32(p.gain)
+        for axis, by in enumerate(p.roll):
+            edge = slice(None, by) if by > 0 else slice(by, None)
+            if by:
+                x[(slice(None),) * axis + (edge,)] = np.nan
+        yield x
+
+
+def _moments(placed: Sequence[_Placed]) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and variance over the frames, pixel by pixel (Welford 1962)."""
+    count = mean = square = np.zeros(())
+    for x in _frames(placed):
+        seen = np.isfinite(x)
+        count = count + seen
+        delta = np.where(seen, x - mean, 0)
+        mean = mean + delta / np.maximum(count, 1)
+        square = square + delta * np.where(seen, x - mean, 0)
+    return mean, square / np.maximum(count - 1, 1)
+
+
+def _spread_over_site(variance: np.ndarray, cfa: str) -> np.ndarray:
+    """The variance averaged over neighbours of the same CFA site: one pixel's own is from too few frames."""
+    out = np.empty_like(variance)
+    for row, column in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        out[row::2, column::2] = uniform_filter(variance[row::2, column::2], _PATCH_TILES, mode="reflect")
+    return np.maximum(out, 0)
+
+
+def _noise(raw: Raw, camera: str) -> NoiseLevel:
+    if camera:
+        return load_profile(camera).level(raw.iso)
+    if raw.noise is not None:
+        return raw.noise
+    return estimate_noise(raw).level
+
+
+def _level_order(level: str) -> tuple[float, str]:
+    digits = "".join(c for c in level if c.isdigit() or c == ".")
+    try:
+        return float(digits), level
+    except ValueError:
+        return float("inf"), level
+
+
+def _csv(qualities: Sequence[TruthQuality]) -> str:
+    text = io.StringIO()
+    writer = csv.DictWriter(text, [field.name for field in fields(TruthQuality)], lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(asdict(quality) for quality in qualities)
+    return text.getvalue()

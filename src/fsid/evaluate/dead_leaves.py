@@ -1,0 +1,94 @@
+"""The rival among synthetic data: dead-leaves pictures, overlapping discs of random size, colour and shade.
+
+    density of radii ~ 1 / r^3,    r_min <= r <= r_max        (scale invariance: Lee, Mumford, Huang 2001)
+
+Trained on nothing else, denoisers come close to those trained on photographs (Achddou, Gousseau, Ladjal 2021,
+"Synthetic images as a regularity prior for image restoration neural networks"). As there, discs take colours
+from natural palettes, some carry a gradient, and the picture is drawn at twice its size and averaged down.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from fsid.dataset import to_uint8
+from fsid.errors import FsidError
+
+RADIUS_PX = (2.0, 400.0)
+OVERSAMPLING = 2
+SHADED_SHARE = 0.5
+
+
+def dead_leaves_rand(rng: np.random.Generator, height: int, width: int) -> np.ndarray:
+    """A picture (height, width, 3) float32, sRGB-encoded 0..1, every pixel covered by a disc."""
+    rows, columns = height * OVERSAMPLING, width * OVERSAMPLING
+    picture = np.zeros((rows, columns, 3), np.float32)
+    bare = np.ones((rows, columns), bool)
+    palette = _palette_rand(rng)
+    low, high = (r * OVERSAMPLING for r in RADIUS_PX)
+    high = min(high, 0.5 * max(rows, columns))
+    left = bare.size
+    for _ in range(400_000):
+        if left <= 0.0005 * bare.size:
+            break
+        radius = float((rng.uniform(high**-2.0, low**-2.0)) ** -0.5)
+        left -= _put(rng, picture, bare, radius, palette[rng.integers(len(palette))])
+    picture[bare] = palette.mean(axis=0)
+    n = OVERSAMPLING
+    return picture.reshape(height, n, width, n, 3).mean((1, 3)).clip(0, 1)
+
+
+def write_dead_leaves(folder: Path, count: int, *, height: int, width: int, seed: int) -> None:
+    """Pictures 0 .. count-1 as PNG files; those that are there already are kept."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for i in range(count):
+            path = folder / f"{i:06d}.png"
+            if path.exists():
+                continue
+            rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(i,)))
+            part = path.with_suffix(".part")
+            Image.fromarray(to_uint8(dead_leaves_rand(rng, height, width))).save(part, format="PNG")
+            part.replace(path)
+    except OSError as error:
+        raise FsidError(f"{folder}: cannot be written ({error.strerror})") from None
+
+
+def _put(
+    rng: np.random.Generator, picture: np.ndarray, bare: np.ndarray, radius: float, colour: np.ndarray
+) -> int:
+    """One disc below all that lie there already; returns how many pixels it covered."""
+    rows, columns = bare.shape
+    y, x = rng.uniform(-radius, rows + radius), rng.uniform(-radius, columns + radius)
+    shaded, direction, strength = (
+        rng.random() < SHADED_SHARE,
+        rng.uniform(0, 2 * np.pi),
+        rng.uniform(-0.4, 0.4),
+    )
+    top, left = max(0, int(y - radius)), max(0, int(x - radius))
+    window = np.s_[top : min(rows, int(y + radius) + 1), left : min(columns, int(x + radius) + 1)]
+    free = bare[window]
+    if not free.any():
+        return 0
+    dy = np.arange(top, top + free.shape[0])[:, None] - y
+    dx = np.arange(left, left + free.shape[1])[None, :] - x
+    new = free & (dx**2 + dy**2 <= radius**2)
+    if shaded:
+        shade = 1 + strength * (dx * np.cos(direction) + dy * np.sin(direction)) / radius
+        picture[window][new] = (colour * shade[..., None])[new]
+    else:
+        picture[window][new] = colour
+    free[new] = False
+    return int(new.sum())
+
+
+def _palette_rand(rng: np.random.Generator, size: int = 256) -> np.ndarray:
+    """(size, 3) sRGB-encoded colours of one picture: correlated channels around two hues."""
+    hues = rng.normal(0, 0.12, (2, 3))
+    level = rng.beta(1.6, 1.8, size)
+    share = rng.uniform(0, 1, (size, 1))
+    tint = hues[0] * share + hues[1] * (1 - share) + rng.normal(0, 0.03, (size, 3))
+    return np.clip(level[:, None] * (1 + tint - tint.mean(axis=1, keepdims=True)), 0.01, 1).astype(np.float32)

@@ -1,0 +1,226 @@
+"""The paper's two experiments: the ablation (its Table 1) and synthetic against real (its Table 2).
+
+    for every source of training data, for every seed:  generate -> train -> measure on the same test sets
+
+Sources: the scene variants objects, materials, objects-materials and full; photographs through the same
+unprocessing and noise; dead-leaves pictures. Every stage continues where it was stopped, and what is finished
+is not done again, so a killed experiment is started again by the same command. Seeds vary the network's first
+weights, patches and noise; the data set of a source is one and the same, of the first seed.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Literal
+
+from fsid.config import from_plain, load_settings, read_yaml, save_settings, to_plain
+from fsid.dataset import GenerateConfig, generate
+from fsid.denoise import train, train_config
+from fsid.errors import FsidError
+from fsid.evaluate.compare import (
+    CLASSICAL,
+    NOISY,
+    ImageRow,
+    Method,
+    Row,
+    compare,
+    summarise,
+    write_images,
+    write_results,
+)
+from fsid.evaluate.dead_leaves import write_dead_leaves
+from fsid.evaluate.experiment_report import write_experiment_report
+from fsid.evaluate.models import model_method
+from fsid.evaluate.simulated import simulated_testset
+from fsid.evaluate.testset import photo_testset, read_testset
+from fsid.scene import VARIANTS
+
+Kind = Literal["ablation", "real-vs-synthetic"]
+ProgressBar = Callable[[str, str], AbstractContextManager[Callable[[int, int], None]]]
+
+PHOTOGRAPHS, DEAD_LEAVES, SCENES = "photographs", "dead-leaves", "full"
+SOURCES: dict[Kind, tuple[str, ...]] = {
+    "ablation": VARIANTS,
+    "real-vs-synthetic": (PHOTOGRAPHS, SCENES, DEAD_LEAVES),
+}
+TEST_ISOS = (800, 1600, 3200, 6400)
+
+
+@dataclass(frozen=True)
+class ExperimentConfig:
+    """One experiment: with its folder of photographs, everything that its result depends on.
+
+    count: pairs per source, width x height pixels each (photographs: as much of it as they have). steps: of
+    every training, 0 takes those of the configuration `network` (a built-in name or a YAML file). seeds: one
+    training per source and seed. photos: folder to train the real rival on. tests: folders of photographs to
+    measure on, beside the simulated materials (materials_scenes pictures of each, test_width x test_height).
+    settings: `key=value` of the generator, for every source of scenes.
+    """
+
+    kind: Kind
+    count: int
+    steps: int
+    network: str
+    seeds: tuple[int, ...]
+    width: int
+    height: int
+    camera: str = "pixel6"
+    photos: str = ""
+    tests: tuple[str, ...] = ()
+    materials_scenes: int = 3
+    test_width: int = 768
+    test_height: int = 576
+    settings: tuple[str, ...] = ()
+    train_settings: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if min(self.count, self.materials_scenes) < 1 or self.steps < 0 or not self.seeds:
+            raise FsidError("--count and --seeds must name at least one, --steps must not be negative")
+        if len(set(self.seeds)) < len(self.seeds):
+            raise FsidError(f"--seeds {' '.join(map(str, self.seeds))}: give different ones")
+        if self.kind == "real-vs-synthetic" and not self.photos:
+            raise FsidError("--photos: name the folder of photographs that the real rival is trained on")
+
+
+def scale_config(kind: Kind, scale: str) -> ExperimentConfig:
+    """The settings of a scale: "smoke" (minutes), "cpu" (hours on two cores), "paper" (175,000 pairs)."""
+    photos = "." if kind == "real-vs-synthetic" else ""
+    if scale == "smoke":
+        tiny = (
+            "network.width=8",
+            "held_out=0",
+            "batch=2",
+            "patch_px=16",
+            "warmup_steps=2",
+            "validate_every=1000",
+        )
+        return ExperimentConfig(
+            kind, 4, 30, "nafnet-tiny", (0, 1), 128, 96, photos=photos, materials_scenes=1,
+            test_width=96, test_height=96, train_settings=tiny,
+        )  # fmt: skip
+    if scale == "cpu":
+        return ExperimentConfig(kind, 200, 6000, "nafnet-tiny", (0, 1), 640, 360, photos=photos)
+    if scale == "paper":
+        return ExperimentConfig(kind, 175_000, 0, "paper", (0, 1), 1920, 1080, photos=photos)
+    raise FsidError(f"--scale {scale}: choose smoke, cpu or paper")
+
+
+def experiment(out: Path, config: ExperimentConfig, bar: ProgressBar, *, workers: int = 1) -> Path:
+    """Run it in `out`, or go on with it; returns the path of the report.
+
+    Writes results.json (the rows of all test sets), images.csv and report.html. bar(label, unit): a context
+    manager that yields progress(done, total).
+    """
+    _claim(out, config)
+    testsets = _testsets(out, config, bar)
+    rows, images = _measured(out / "baselines", [NOISY, CLASSICAL], testsets, bar)
+    for source in SOURCES[config.kind]:
+        data = _data(out, config, source, bar, workers)
+        for seed in config.seeds:
+            name = f"{source}-seed{seed}"
+            run = out / "runs" / name
+            settings = [f"seed={seed}", *config.train_settings]
+            if config.steps:
+                settings.append(f"steps={config.steps}")
+            if not (out / "measured" / f"{name}.csv").exists():
+                with bar(f"training {name}", "steps") as progress:
+                    train(data, run, train_config(config.network, settings), progress=progress)
+            trained = model_method(run, name)
+            method = Method(name, f"{config.count} pairs from {source}", trained.denoise)
+            new_rows, new_images = _measured(out / "measured" / name, [method], testsets, bar)
+            rows += new_rows
+            images += new_images
+    write_results(rows, out / "results.json")
+    write_images(images, out / "images.csv")
+    return write_experiment_report(out / "report.html", config, SOURCES[config.kind], rows, images)
+
+
+def _claim(out: Path, config: ExperimentConfig) -> None:
+    """Refuse a folder that holds another experiment."""
+    file = out / "experiment.yaml"
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        if not file.exists():
+            save_settings(config, file)
+    except OSError as error:
+        raise FsidError(f"{out}: cannot be written ({error.strerror})") from None
+    there = from_plain(ExperimentConfig, read_yaml(file), source=str(file))
+    if there != config:
+        plain, ours = to_plain(there), to_plain(config)
+        keys = ", ".join(key for key in ours if plain[key] != ours[key])
+        raise FsidError(f"{out}: holds another experiment; these differ: {keys}. Use another folder")
+
+
+def _data(out: Path, config: ExperimentConfig, source: str, bar: ProgressBar, workers: int) -> Path:
+    """The training pairs of a source."""
+    data = out / "data" / source
+    seed = config.seeds[0]
+    overrides = [f"width={config.width}", f"height={config.height}", f"cameras=[{config.camera}]"]
+    if source in VARIANTS:
+        overrides += [f"variant={source}", *config.settings]
+    elif source == PHOTOGRAPHS:
+        overrides.append(f"images={Path(config.photos).resolve()}")
+    else:
+        pictures = out / "dead-leaves"
+        write_dead_leaves(pictures, config.count, height=config.height, width=config.width, seed=seed)
+        overrides.append(f"images={pictures.resolve()}")
+    settings = load_settings(GenerateConfig, None, overrides)
+    with bar(f"pairs from {source}", "pairs") as progress:
+        generate(data, settings, count=config.count, seed=seed, workers=workers, progress=progress)
+    return data
+
+
+def _testsets(out: Path, config: ExperimentConfig, bar: ProgressBar) -> list[Path]:
+    """The simulated materials in lux, and every folder of photographs at TEST_ISOS."""
+    root = out / "testsets"
+    found = [root / "materials"]
+    if not (found[0] / "testset.json").exists():
+        with bar("drawing test materials", "pictures") as progress:
+            simulated_testset(
+                found[0],
+                camera=config.camera,
+                scenes=config.materials_scenes,
+                width=config.test_width,
+                height=config.test_height,
+                seed=1000,
+                progress=progress,
+            )
+    for folder in config.tests:
+        path = root / Path(folder).resolve().name
+        found.append(path)
+        if not (path / "testset.json").exists():
+            with bar(f"test set {path.name}", "photographs") as progress:
+                photo_testset([Path(folder)], path, camera=config.camera, isos=TEST_ISOS, progress=progress)
+    return found
+
+
+def _measured(
+    stem: Path, methods: Sequence[Method], testsets: Sequence[Path], bar: ProgressBar
+) -> tuple[list[Row], list[ImageRow]]:
+    """Figures of methods on all test sets; kept in stem.csv, and read from there the next time."""
+    file = stem.with_suffix(".csv")
+    if not file.exists():
+        file.parent.mkdir(parents=True, exist_ok=True)
+        images: list[ImageRow] = []
+        for testset in testsets:
+            with bar(f"measuring {stem.name} on {testset.name}", "captures") as progress:
+                images += compare(testset, methods, progress=progress).images
+        part = file.with_suffix(".part")
+        write_images(images, part)
+        part.replace(file)
+    images = _read_images(file)
+    rows = [row for testset in testsets for row in summarise(read_testset(testset), methods, images)]
+    return rows, images
+
+
+def _read_images(file: Path) -> list[ImageRow]:
+    numbers = {field.name for field in fields(ImageRow) if field.type == "float"}
+    with file.open(newline="", encoding="utf-8") as stream:
+        return [
+            ImageRow(*(float(v) if key in numbers else v for key, v in line.items()))  # type: ignore[arg-type]
+            for line in csv.DictReader(stream)
+        ]

@@ -1,0 +1,68 @@
+"""The paper's test set as a simulation: ten materials, light levels in lux, one named camera.
+
+    material -> light -> camera RGB -> truth;      lux -> exposure and ISO (`sensor.light`) -> noisy frames
+
+A white sheet in the middle of the picture gets KEY / GREY of saturation, as the camera's auto-exposure sets
+it. Noise has all terms of the camera's profile; the fixed ones (banding, fixed pattern) are those of one unit
+of the camera.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from fsid.errors import FsidError
+from fsid.evaluate.testbench import MATERIALS, simulate
+from fsid.evaluate.testset import Progress, TestImage, TestSet, capture, levels_of
+from fsid.sensor import Raw, clean_from_linear, load_profile
+from fsid.sensor.light import GREY, KEY
+
+LUXES = (0.5, 1.0, 2.0, 5.0)
+"""The light levels of the paper."""
+
+
+def simulated_testset(
+    out: Path,
+    *,
+    camera: str,
+    luxes: Sequence[float] = (),
+    isos: Sequence[int] = (),
+    frames: int = 1,
+    scenes: int = 3,
+    width: int = 1024,
+    height: int = 768,
+    materials: Sequence[str] = (),
+    seed: int = 0,
+    progress: Progress = lambda done, total: None,
+) -> TestSet:
+    """Draw `scenes` pictures of every material and capture `frames` noisy frames of each at every level.
+
+    luxes and isos: the levels, LUXES where neither is given. materials: of MATERIALS, all where none is.
+    """
+    profile = load_profile(camera)
+    levels = levels_of(profile, isos, luxes or (() if isos else LUXES))
+    materials = materials or tuple(MATERIALS)
+    if unknown := set(materials) - set(MATERIALS):
+        raise FsidError(f"{sorted(unknown)[0]}: no such material; choose from {', '.join(MATERIALS)}")
+    if not (1 <= frames <= 100 and scenes >= 1):
+        raise FsidError(f"--frames {frames}: 1 to 100 are possible, and --scenes must be at least 1")
+    if min(width, height) < 64 or width % 2 or height % 2:
+        raise FsidError(f"--width {width} --height {height}: give even numbers of at least 64 pixels")
+    testset = TestSet(
+        camera=profile.name,
+        levels=tuple(levels),
+        images=tuple(TestImage(f"{name}-{n:02d}", name) for name in materials for n in range(scenes)),
+        seed=seed,
+        notes="drawn materials, light levels by the exposure model, noise from the camera's profile",
+        frames=frames,
+    )
+
+    def truth(rng: np.random.Generator, i: int) -> Raw:
+        light = simulate(rng, testset.images[i].set, height, width)
+        return clean_from_linear(rng, light * np.float32(KEY / GREY), profile)
+
+    capture(testset, out, profile, levels, truth, progress)
+    return testset

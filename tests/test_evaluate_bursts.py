@@ -1,0 +1,145 @@
+"""Test sets from captured bursts: the truth is better than any frame, and says by how much."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.ndimage import shift
+
+from fsid.cli.main import main
+from fsid.evaluate import psnr, read_testset, simulated_testset
+from fsid.evaluate.bursts import average
+from fsid.sensor import Raw, load_profile, noisy_from_clean, read_raw, write_dng
+
+FRAMES = 12
+PROFILE = load_profile("pixel6")
+
+
+@pytest.fixture(scope="module")
+def clean(tmp_path_factory: pytest.TempPathFactory) -> Raw:
+    root = tmp_path_factory.mktemp("clean") / "set"
+    simulated_testset(
+        root, camera="pixel6", isos=[1600], scenes=1, width=128, height=96, materials=["fabric"]
+    )
+    return read_raw(root / "fabric-00" / "clean.dng")
+
+
+def _burst(folder: Path, clean: Raw, change=lambda raw, frame: raw) -> list[Path]:
+    """FRAMES noisy frames of `clean` at ISO 1600; change(raw, frame) alters the light of a frame."""
+    folder.mkdir(parents=True)
+    clean = replace(clean, black_level=PROFILE.black_level, white_level=PROFILE.white_level)
+    paths = []
+    for frame in range(FRAMES):
+        seen = change(clean, frame)
+        noisy = noisy_from_clean(np.random.default_rng(frame), seen, 1600, PROFILE.level(1600))
+        paths.append(folder / f"{frame:03d}.dng")
+        write_dng(paths[-1], noisy)
+    return paths
+
+
+def shifted(mosaic: np.ndarray, tiles: float) -> np.ndarray:
+    """The mosaic moved down and right by a number of CFA tiles, site by site."""
+    out = np.empty_like(mosaic)
+    for row, column in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        out[row::2, column::2] = shift(mosaic[row::2, column::2], (tiles, tiles), order=3, mode="grid-wrap")
+    return out.clip(0, 1)
+
+
+def test_the_error_of_the_truth_is_what_it_says(clean: Raw, tmp_path: Path):
+    paths = _burst(tmp_path / "b", clean)
+    truth, quality = average(paths[1:], paths[0])
+    inner = clean.mosaic < 0.9
+    error = (truth.mosaic - clean.mosaic)[inner].std()
+    assert quality.frames == FRAMES - 1
+    assert quality.error == pytest.approx(error, rel=0.1)
+    assert psnr(truth.mosaic, clean.mosaic) > psnr(read_raw(paths[0]).mosaic, clean.mosaic) + 9
+
+
+def test_flicker_is_divided_out(clean: Raw, tmp_path: Path):
+    flicker = 1 + 0.08 * np.sin(np.arange(FRAMES) * 2.0)
+    flicker[0] = 1
+    paths = _burst(
+        tmp_path / "b", clean, lambda raw, f: replace(raw, mosaic=raw.mosaic * np.float32(flicker[f]))
+    )
+    truth, quality = average(paths[1:], paths[0])
+    assert quality.flicker == pytest.approx(np.abs(flicker[1:] - 1).max(), rel=0.1)
+    assert (truth.mosaic - clean.mosaic)[clean.mosaic < 0.8].std() < 1.3 * quality.error
+
+
+def test_whole_shifts_are_undone_and_others_left_out(clean: Raw, tmp_path: Path):
+    def moved(raw: Raw, frame: int) -> Raw:
+        if frame == 3:
+            return replace(raw, mosaic=np.roll(raw.mosaic, (4, -6), (0, 1)))
+        if frame == 5:
+            return replace(raw, mosaic=shifted(raw.mosaic, 0.5))
+        return raw
+
+    paths = _burst(tmp_path / "b", clean, moved)
+    truth, quality = average(paths[1:], paths[0])
+    assert quality.left_out == 1
+    assert quality.shift_px == pytest.approx(np.hypot(4, 6))
+    assert (truth.mosaic - clean.mosaic)[clean.mosaic < 0.9].std() < 1.3 * quality.error
+
+
+def test_a_fly_on_the_chart_is_an_outlier(clean: Raw, tmp_path: Path):
+    def fly(raw: Raw, frame: int) -> Raw:
+        mosaic = raw.mosaic.copy()
+        if frame == 4:
+            mosaic[20:30, 40:50] = 0.9
+        return replace(raw, mosaic=mosaic)
+
+    paths = _burst(tmp_path / "b", clean, fly)
+    truth, quality = average(paths[1:], paths[0])
+    error = np.abs(truth.mosaic - clean.mosaic)[20:30, 40:50].mean()
+    assert error < 3 * quality.error
+    assert quality.outliers > 0
+
+
+def test_the_command_makes_a_set_that_evaluate_reads(clean: Raw, tmp_path: Path, capsys):
+    for level in ("0.5lux", "5lux"):
+        _burst(tmp_path / "captures" / "fabric" / level, clean)
+    out = tmp_path / "set"
+    main(["testset", "from-bursts", str(tmp_path / "captures"), "-o", str(out), "--frames", "2", "--quiet"])
+    testset = read_testset(out)
+    assert (testset.levels, testset.frames) == (("0.5lux", "5lux"), 2)
+    with (out / "truth.csv").open() as stream:
+        lines = list(csv.DictReader(stream))
+    assert {line["frames"] for line in lines} == {str(FRAMES - 2)}
+    assert float(lines[0]["psnr"]) > 40
+    noisy = read_raw(testset.noisy(out, testset.images[0], "5lux", 1))
+    assert noisy.noise is not None
+    assert np.mean(noisy.noise.k) == pytest.approx(np.mean(PROFILE.level(1600).k), rel=0.01)
+    main(["evaluate", str(out)])
+    assert "fabric" in capsys.readouterr().out
+
+
+def test_a_burst_that_moves_all_the_time_is_refused(clean: Raw, tmp_path: Path, capsys):
+    def blurred(raw: Raw, frame: int) -> Raw:
+        return replace(raw, mosaic=shifted(raw.mosaic, frame + 0.5 * (frame > 0)))
+
+    _burst(tmp_path / "captures" / "fabric" / "1lux", clean, blurred)
+    with pytest.raises(SystemExit) as stop:
+        main(["testset", "from-bursts", str(tmp_path / "captures"), "-o", str(tmp_path / "set"), "--quiet"])
+    assert stop.value.code == 2
+    assert "lie still" in " ".join(capsys.readouterr().err.split())
+    assert not (tmp_path / "set").exists()
+
+
+@pytest.mark.parametrize("missing", ["frames", "level", "all"])
+def test_what_is_missing_is_named(clean: Raw, tmp_path: Path, missing: str, capsys):
+    captures = tmp_path / "captures"
+    captures.mkdir()
+    if missing != "all":
+        _burst(captures / "a" / "1lux", clean)
+        other = _burst(captures / "b" / ("2lux" if missing == "level" else "1lux"), clean)
+        for path in other[2:] if missing == "frames" else []:
+            path.unlink()
+    with pytest.raises(SystemExit) as stop:
+        main(["testset", "from-bursts", str(captures), "-o", str(tmp_path / "set"), "--quiet"])
+    assert stop.value.code == 2
+    words = {"frames": "holds 2 frames", "level": "has no burst", "all": "holds no bursts"}[missing]
+    assert words in " ".join(capsys.readouterr().err.split())

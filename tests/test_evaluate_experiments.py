@@ -1,0 +1,110 @@
+"""The experiments run, go on where they were stopped, and their gaps are those of the images."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fsid.cli.main import main
+from fsid.evaluate.compare import ImageRow
+from fsid.evaluate.dead_leaves import RADIUS_PX, dead_leaves_rand
+from fsid.evaluate.experiment_report import gaps
+
+SMOKE = ("--scale", "smoke", "--count", "2", "--steps", "3", "--quiet")
+
+
+def test_dead_leaves_cover_the_picture_with_edges_of_all_sizes():
+    picture = dead_leaves_rand(np.random.default_rng(0), 96, 128)
+    assert picture.shape == (96, 128, 3)
+    assert picture.min() >= 0
+    assert picture.max() <= 1
+    assert np.array_equal(picture, dead_leaves_rand(np.random.default_rng(0), 96, 128))
+    assert np.mean(np.abs(np.diff(picture.mean(-1), axis=1)) > 0.05) > 0.02
+    assert RADIUS_PX[0] < RADIUS_PX[1]
+
+
+def test_a_gap_is_paired_by_image():
+    rows = [
+        ImageRow(model, "iso800", "s", name, value, value, 0.9)
+        for model, values in (("full-seed0", {"a": 40.0, "b": 30.0}), ("x-seed0", {"b": 29.0, "a": 40.5}))
+        for name, value in values.items()
+    ]
+    assert sorted(gaps(rows, "full-seed0", "x-seed0", "iso800", "s", "psnr_raw")) == [-0.5, 1.0]
+
+
+def test_synthetic_against_real_goes_on_where_it_was_stopped(photos: Path, tmp_path: Path):
+    out = tmp_path / "experiment"
+    held_back = tmp_path / "other"
+    shutil.copytree(photos, held_back)
+    command = ["experiment", "real-vs-synthetic", "-o", str(out), "--photos", str(photos), *SMOKE]
+    command += ["--seeds", "3", "--test", str(held_back)]
+    main(command)
+    rows = json.loads((out / "results.json").read_text())
+    assert set(rows[0]) == {"model", "training", "camera", "level", "set", "n", "psnr_raw", "psnr", "ssim"}
+    models = {row["model"] for row in rows}
+    assert models == {"noisy", "classical", "photographs-seed3", "full-seed3", "dead-leaves-seed3"}
+    assert {"0.5lux", "5lux", "iso800", "iso6400"} <= {row["level"] for row in rows}
+    assert "full - photographs" in (out / "report.html").read_text()
+
+    before = {p: p.stat().st_mtime_ns for p in out.rglob("*.tar")}
+    (out / "measured" / "full-seed3.csv").unlink()
+    shutil.rmtree(out / "runs" / "full-seed3")
+    main(command)
+    assert json.loads((out / "results.json").read_text()) == rows
+    assert before == {p: p.stat().st_mtime_ns for p in out.rglob("*.tar")}
+
+    with pytest.raises(SystemExit) as stop:
+        main([*command, "--count", "3"])
+    assert stop.value.code == 2
+
+
+def test_the_ablation_compares_the_four_variants(tmp_path: Path):
+    out = tmp_path / "ablation"
+    main(["experiment", "ablation", "-o", str(out), *SMOKE, "--seeds", "0"])
+    models = {row["model"] for row in json.loads((out / "results.json").read_text())}
+    assert {"objects-seed0", "materials-seed0", "objects-materials-seed0", "full-seed0"} <= models
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["real-vs-synthetic"], "--photos: name the folder"),
+        (["real-vs-synthetic", "--photos", "nowhere"], "nowhere: is not a folder"),
+        (["ablation", "--photos", "."], "only real-vs-synthetic"),
+        (["ablation", "--seeds", "1", "1"], "give different ones"),
+        (["real-vs-synthetic", "--photos", ".", "--test", "."], "test on other photographs"),
+    ],
+)
+def test_bad_input_is_one_line(tmp_path: Path, arguments: list[str], words: str, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(["experiment", *arguments, "-o", str(tmp_path / "out"), "--quiet"])
+    assert stop.value.code == 2
+    assert words in " ".join(capsys.readouterr().err.split())
+
+
+def test_the_slider_of_a_report_moves_in_a_browser(photos: Path, tmp_path: Path):
+    browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if browser is None:
+        pytest.skip("no headless browser: install chromium")
+    main(["testset", "photos", str(photos), "-o", str(tmp_path / "set"), "--iso", "3200", "--quiet"])
+    main(["evaluate", str(tmp_path / "set"), "-o", str(tmp_path / "out"), "--quiet"])
+    page = (tmp_path / "out" / "report.html").read_text()
+    probe = """<script type="module">
+      const input = document.querySelector(".slider input");
+      input.value = 20; input.dispatchEvent(new Event("input"));
+      const over = getComputedStyle(document.querySelector(".slider .over")).clipPath;
+      const loaded = [...document.images].every(image => image.complete && image.naturalWidth > 0);
+      document.title = `${over} ${loaded}`;
+    </script></body>"""
+    (tmp_path / "probe.html").write_text(page.replace("</body>", probe))
+    flags = ("--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=5000", "--dump-dom")
+    command = [browser, *flags, (tmp_path / "probe.html").as_uri()]
+    dom = subprocess.run(command, capture_output=True, text=True, timeout=120).stdout
+    title = dom[dom.index("<title>") : dom.index("</title>")]
+    assert "80%" in title
+    assert "true" in title
