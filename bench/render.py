@@ -17,7 +17,7 @@ from fsid.render.drawable import view_of
 from fsid.scene import Scene, SceneConfig, sample
 
 SIZES = ((960, 540), (1920, 1080))
-STAGES = ("scene build", "upload", "shadows", "geometry", "shading", "readback")
+STAGES = ("scene build", "upload", "shadows", "samples", "occlusion", "shading", "readback")
 
 
 def main() -> None:

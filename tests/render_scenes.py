@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fsid.assets import MaterialMaps, Mesh
-from fsid.render.drawable import Drawable, View, room_mesh
+from fsid.assets import MaterialMaps, Mesh, build_background
+from fsid.render.drawable import Drawable, View
 from fsid.scene.model import Camera, Light, Material, Transform, Vec3
 
 STILL = Transform((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
@@ -57,7 +57,7 @@ def sphere(radius_m: float, segments: int = 96) -> Mesh:
 
 def block(size_m: Vec3) -> Mesh:
     """A box on z = 0 that looks outward, in one part."""
-    inside = room_mesh(size_m)
+    inside = build_background("room", size_m)
     parts = np.zeros(len(inside.faces), np.int32)
     return Mesh(inside.vertices, -inside.normals, inside.faces[:, ::-1].copy(), parts, ("block",))
 

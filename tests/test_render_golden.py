@@ -21,7 +21,7 @@ from scipy.ndimage import uniform_filter
 
 from fsid.assets import MaterialMaps
 from fsid.render import Renderer
-from fsid.render.drawable import Drawable, View, room_drawable
+from fsid.render.drawable import Drawable, View, background_drawable
 from fsid.scene.model import Background, Camera, Light, Material, Transform
 from render_scenes import bake_plain, block, grid, plain, point_light, sphere
 
@@ -65,7 +65,7 @@ def room_view(lights: tuple[Light, ...], ambient: float, *things: Drawable) -> V
     materials = {name: plain((0.6, 0.6, 0.55)) for name in NAMES}
     materials["floor"] = patterned("checks", (0.5, 0.45, 0.4), (0.25, 0.2, 0.15), DARK, turn_deg=30.0)
     materials["wall_north"] = patterned("waves", COOL, (0.5, 0.5, 0.6), DARK)
-    room = room_drawable(Background("room", (4.0, 5.0, 2.6), materials))
+    room = background_drawable(Background("room", (4.0, 5.0, 2.6), materials))
     return View((room, *things), lights, (ambient,) * 3, CAMERA, (4.0, 5.0, 2.6), room.materials)
 
 

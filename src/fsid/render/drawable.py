@@ -1,21 +1,35 @@
 """Scene -> drawables: geometry with a place and materials, the only thing that the passes below know.
 
-The room is one more drawable: a box seen from inside.
+The background and the shining faces of area lights are drawables like any other.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fsid.assets import Mesh, build_mesh
+from fsid.assets import Mesh, build_background, build_mesh
+from fsid.assets.solids import rotation_matrix
 from fsid.errors import FsidError
-from fsid.scene.model import Background, Camera, Light, Material, Scene, Transform, Vec3
+from fsid.render.shadows import KINDS, half_axes
+from fsid.scene.model import (
+    ZERO,
+    Background,
+    Camera,
+    Light,
+    Material,
+    Motion,
+    Scene,
+    Sky,
+    Transform,
+    Vec3,
+)
 
 BACKGROUND_ID = -1
-MAX_OBJECTS = 65534
-"""The G-buffer keeps 16 bits of the object id."""
+MAX_OBJECTS = 65533
+"""The frame's object ids pass through 16 bits."""
 
 DIELECTRIC_SPECULAR = 0.04
 """Reflectance at normal incidence of a surface with refractive index 1.5."""
@@ -23,21 +37,58 @@ DIELECTRIC_SPECULAR = 0.04
 SURFACES = ("wall_east", "wall_west", "wall_north", "wall_south", "ceiling", "floor")
 """Surfaces of a room in the order +x, -x, +y, -y, +z, -z."""
 
+STILL = Transform(ZERO, ZERO, (1.0, 1.0, 1.0))
+UNMOVED = Motion()
+CLEAR = 0.5
+"""Transmission from which a material is drawn as glass, behind which the rest of the scene is seen."""
+
 
 @dataclass(frozen=True)
 class Drawable:
-    """materials: one per part of the mesh. specular: reflectance of its dielectric parts, 0..1."""
+    """materials: one per part of the mesh. specular: reflectance of its dielectric parts, 0..1.
+
+    glow: radiance of the front whatever the material. casts: whether it shades anything.
+    """
 
     mesh: Mesh
     transform: Transform
     materials: tuple[Material, ...]
     object_id: int
     specular: float = DIELECTRIC_SPECULAR
+    motion: Motion = UNMOVED
+    glow: Vec3 = ZERO
+    casts: bool = True
+
+    def pose(self, time_s: float) -> tuple[np.ndarray, np.ndarray]:
+        """Rotation (3, 3) and position (3,) at a time: x_world = rotation (x * scale) + position."""
+        rotation = rotation_matrix(*self.transform.rotation_deg)
+        position = np.array(self.transform.position_m) + np.array(self.motion.velocity_m_s) * time_s
+        return turn_about(self.motion.spin_deg_s, time_s) @ rotation, position
+
+    @property
+    def is_glass(self) -> bool:
+        """Whether light passes through any part of it."""
+        return any(material.transmission >= CLEAR for material in self.materials)
+
+
+def turn_about(spin_deg_s: Vec3, time_s: float) -> np.ndarray:
+    """(3, 3) rotation by |spin| * time about the axis of `spin` (Rodrigues)."""
+    turn = np.radians(np.array(spin_deg_s, dtype=float)) * time_s
+    angle = float(np.linalg.norm(turn))
+    if angle == 0.0:
+        return np.eye(3)
+    x, y, z = turn / angle
+    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * (K @ K)
 
 
 @dataclass(frozen=True)
 class View:
-    """One image to make. room_materials: six, in the order of SURFACES; none means white surroundings."""
+    """One image to make.
+
+    room_size_m, room_floor_m: the box of the surroundings. room_materials: six, in the order of SURFACES;
+    none means white surroundings. sky: the surroundings instead of a box.
+    """
 
     drawables: tuple[Drawable, ...]
     lights: tuple[Light, ...]
@@ -45,73 +96,94 @@ class View:
     camera: Camera
     room_size_m: Vec3
     room_materials: tuple[Material, ...] = ()
+    room_floor_m: float = 0.0
+    sky: Sky | None = None
 
 
 def view_of(scene: Scene, camera_index: int) -> View:
-    """The room and the objects of a scene from one of its cameras. Raises FsidError."""
+    """The background and the objects of a scene from one of its cameras. Raises FsidError."""
     if not 0 <= camera_index < len(scene.cameras):
         raise FsidError(f"camera_index {camera_index}: the scene has {len(scene.cameras)} cameras")
-    room = room_drawable(scene.background)
+    for i, light in enumerate(scene.lights):
+        _check_light(i, light)
+    background = background_drawable(scene.background)
+    panels = [
+        panel_drawable(light, background.materials[0]) for light in scene.lights if light.kind == "area"
+    ]
+    open_air = scene.background.kind == "open-air"
+    floor = 0.0 if open_air else float(background.mesh.vertices[:, 2].min())
     return View(
-        drawables=(room, *_objects(scene)),
+        drawables=(background, *_objects(scene), *panels),
         lights=scene.lights,
         ambient=scene.ambient,
         camera=scene.cameras[camera_index],
         room_size_m=scene.background.size_m,
-        room_materials=room.materials,
+        room_materials=() if open_air else _sides(scene.background),
+        room_floor_m=floor,
+        sky=(scene.sky or Sky("procedural", scene.ambient)) if open_air else None,
     )
+
+
+def _check_light(i: int, light: Light) -> None:
+    if light.kind not in KINDS:
+        raise FsidError(f"scene.lights[{i}].kind '{light.kind}' is not known; use {', '.join(KINDS)}")
+    if light.kind == "area" and not min(light.size_m) > 0:
+        raise FsidError(f"scene.lights[{i}].size_m = {light.size_m}: an area light needs two lengths above 0")
+    if light.kind != "point" and not np.linalg.norm(light.direction) > 0:
+        raise FsidError(f"scene.lights[{i}].direction = {light.direction}: must not be zero")
 
 
 def _objects(scene: Scene) -> list[Drawable]:
     if not len(scene.objects) == len(scene.materials) == len(scene.transforms):
         raise FsidError("scene: objects, materials and transforms must have the same length")
+    if scene.motions and len(scene.motions) != len(scene.objects):
+        raise FsidError("scene: give no motions, or one for every object")
     if len(scene.objects) > MAX_OBJECTS:
         raise FsidError(f"scene.objects: {len(scene.objects)} objects; at most {MAX_OBJECTS} can be drawn")
+    motions = scene.motions or (UNMOVED,) * len(scene.objects)
     out = []
-    for i, (S, M, T) in enumerate(zip(scene.objects, scene.materials, scene.transforms, strict=True)):
+    equation = zip(scene.objects, scene.materials, scene.transforms, motions, strict=True)
+    for i, (S, M, T, motion) in enumerate(equation):
         mesh = build_mesh(S.family, S.seed)
         if len(M) != len(mesh.part_names):
             raise FsidError(
                 f"scene.materials[{i}]: {len(M)} materials, but '{S.family}' has {len(mesh.part_names)} parts"
             )
-        out.append(Drawable(mesh, T, M, i))
+        out.append(Drawable(mesh, T, M, i, motion=motion))
     return out
 
 
-def room_drawable(background: Background) -> Drawable:
-    """The inside of the box 0 <= z <= height centred on the origin. Raises FsidError for another kind."""
-    if background.kind != "room":
-        raise FsidError(f"scene.background.kind '{background.kind}' is not known; use 'room'")
-    for name in SURFACES:
+def background_drawable(background: Background) -> Drawable:
+    """B as a drawable. Raises FsidError for a kind that does not exist or a part without material."""
+    mesh = build_background(background.kind, background.size_m)
+    for name in mesh.part_names:
         if name not in background.materials:
             raise FsidError(
-                f"scene.background.materials: '{name}' is missing; give all of {', '.join(SURFACES)}"
+                f"scene.background.materials: '{name}' is missing; give all of {', '.join(mesh.part_names)}"
             )
-    still = Transform((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
-    materials = tuple(background.materials[name] for name in SURFACES)
-    return Drawable(room_mesh(background.size_m), still, materials, BACKGROUND_ID)
+    materials = tuple(background.materials[name] for name in mesh.part_names)
+    return Drawable(mesh, STILL, materials, BACKGROUND_ID)
 
 
-def room_mesh(size_m: tuple[float, float, float]) -> Mesh:
-    """Six quads facing inward, one part each in the order of SURFACES."""
-    vertices, normals, faces = [], [], []
-    half = np.array(size_m) / 2
-    for side in range(6):
-        axis, sign = side // 2, 1 - 2 * (side % 2)
-        u, v = np.zeros(3), np.zeros(3)
-        u[(axis + 1) % 3], v[(axis + 2) % 3] = 1, sign
-        outward = np.zeros(3)
-        outward[axis] = sign
-        vertices += [(outward + a * u + b * v) * half + (0, 0, half[2]) for a, b in _CORNERS]
-        normals += [-outward] * 4
-        faces += [[4 * side, 4 * side + 2, 4 * side + 1], [4 * side, 4 * side + 3, 4 * side + 2]]
-    return Mesh(
-        vertices=np.array(vertices, np.float32),
-        normals=np.array(normals, np.float32),
-        faces=np.array(faces, np.int32),
-        face_parts=np.repeat(np.arange(6, dtype=np.int32), 2),
-        part_names=SURFACES,
+def panel_drawable(light: Light, like: Material) -> Drawable:
+    """The shining rectangle of an area light; `like` is any material, of which only the maps are kept."""
+    width, height = half_axes(light)
+    corners = np.array([-width - height, width - height, width + height, -width + height])
+    normal = np.array(light.direction) / np.linalg.norm(light.direction)
+    mesh = Mesh(
+        vertices=corners.astype(np.float32),
+        normals=np.tile(normal, (4, 1)).astype(np.float32),
+        faces=np.array([[0, 1, 2], [0, 2, 3]], np.int32),
+        face_parts=np.zeros(2, np.int32),
+        part_names=("panel",),
     )
+    black = Material(like.family, like.variant, (ZERO, ZERO, ZERO), 1.0, 0.0, 1.0, 0.0)
+    place = replace(STILL, position_m=light.position_m)
+    return Drawable(mesh, place, (black,), BACKGROUND_ID, specular=0.0, glow=light.colour, casts=False)
 
 
-_CORNERS = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+def _sides(background: Background) -> tuple[Material, ...]:
+    """The material of each side of the box; a sheet that replaces some of them stands for those."""
+    sheet = background.materials.get("sweep")
+    sides: Sequence[Material | None] = [background.materials.get(name, sheet) for name in SURFACES]
+    return tuple(side for side in sides if side is not None)

@@ -12,72 +12,99 @@ from dataclasses import dataclass
 import numpy as np
 
 from fsid.assets import Mesh
-from fsid.assets.solids import rotation_matrix
 from fsid.render.drawable import Drawable
 from fsid.render.layers import Layer
-from fsid.scene.model import Material, Transform
+from fsid.scene.model import Material
 
-VERTEX = np.dtype([("position", "3f4"), ("normal", "3f4"), ("surface", "u4")])
+VERTEX = np.dtype([("normal", "3f4"), ("surface", "u4")])
 
 SURFACE = np.dtype(
     [
         ("place", "(3,4)f4"),  # rows of [rotation | position]
-        ("scale", "3f4"),
-        ("tiles_per_m", "f4"),
         ("colour_a", "3f4"),
         ("turn_cos", "f4"),
         ("colour_b", "3f4"),
         ("turn_sin", "f4"),
         ("colour_c", "3f4"),
         ("roughness_scale", "f4"),
+        ("tiles_per_m", "f4"),
         ("layer", "f4"),
         ("slope_scale", "f4"),
         ("specular", "f4"),
-        ("object_id", "i4"),
+        ("clearcoat", "f4"),
+        ("clearcoat_alpha", "f4"),
+        ("sheen", "f4"),
+        ("translucency", "f4"),
+        ("glow", "3f4"),
+        ("emission", "f4"),
+        ("transmission", "f4"),
+        ("object_id", "f4"),
+        ("padding", "2f4"),
     ]
 )
-"""std430 layout of `struct Surface` in shaders/surfaces.glsl; object_id is one more than the frame's."""
+"""Ten texels of `struct Surface` in shaders/surfaces.glsl; object_id is one more than the frame's."""
+
+_SURFACE_TEXELS = 10
+_SURFACE_ROWS = 2048
 
 
 @dataclass(frozen=True)
 class Geometry:
-    """vertices: VERTEX (V,), in the object. world: (V, 3) float32, the same points in the world.
+    """world: (V, 3) float32, points in the world. vertices: VERTEX (V,), normals in the world.
 
     indices: (3 F,) uint32, drawable after drawable. surfaces: SURFACE (P,). ranges: (N, 2) first index and
     number of indices of each drawable. spheres: (N, 4) world centre and radius of each drawable.
     """
 
-    vertices: np.ndarray
     world: np.ndarray
+    vertices: np.ndarray
     indices: np.ndarray
     surfaces: np.ndarray
     ranges: np.ndarray
     spheres: np.ndarray
 
 
-def merge(drawables: Sequence[Drawable], layer_of: Callable[[Material], Layer]) -> Geometry:
-    """One geometry of all drawables; `layer_of` tells where a material's maps are."""
+def merge(drawables: Sequence[Drawable], layer_of: Callable[[Material], Layer], time_s: float) -> Geometry:
+    """One geometry of all drawables at a time; `layer_of` tells where a material's maps are."""
     vertices, world, indices, surfaces, ranges, spheres = [], [], [], [], [], []
     first_vertex = first_index = first_surface = 0
     for drawable in drawables:
-        mesh_vertices, mesh_indices = _with_surfaces(drawable.mesh, first_surface)
+        index, mesh_surface, faces = _by_surface(drawable.mesh)
+        positions, normals = _in_world(drawable, index, time_s)
+        mesh_vertices = np.empty(len(positions), VERTEX)
+        mesh_vertices["normal"] = normals
+        mesh_vertices["surface"] = mesh_surface + first_surface
         vertices.append(mesh_vertices)
-        world.append(_in_world(mesh_vertices["position"], drawable.transform))
-        indices.append(mesh_indices + np.uint32(first_vertex))
-        surfaces += [_surface(drawable, material, layer_of(material)) for material in drawable.materials]
-        ranges.append((first_index, len(mesh_indices)))
-        spheres.append(_sphere(drawable.mesh, drawable.transform))
+        world.append(positions)
+        indices.append(faces + np.uint32(first_vertex))
+        surfaces += [
+            _surface(drawable, material, layer_of(material), time_s) for material in drawable.materials
+        ]
+        ranges.append((first_index, len(faces)))
+        spheres.append(_sphere(drawable, time_s))
         first_vertex += len(mesh_vertices)
-        first_index += len(mesh_indices)
+        first_index += len(faces)
         first_surface += len(drawable.materials)
     return Geometry(
-        vertices=np.concatenate(vertices),
         world=np.concatenate(world),
+        vertices=np.concatenate(vertices),
         indices=np.concatenate(indices),
         surfaces=np.stack(surfaces),
         ranges=np.array(ranges, np.uint32),
         spheres=np.array(spheres),
     )
+
+
+def surface_texels(surfaces: np.ndarray) -> np.ndarray:
+    """(rows, 10 x blocks, 4) float32: the surface table as a texture."""
+    texels = surfaces.view(np.float32).reshape(-1, _SURFACE_TEXELS, 4)
+    if len(texels) <= _SURFACE_ROWS:
+        return texels
+    blocks = -(-len(texels) // _SURFACE_ROWS)
+    padded = np.zeros((blocks * _SURFACE_ROWS, _SURFACE_TEXELS, 4), np.float32)
+    padded[: len(texels)] = texels
+    by_block = padded.reshape(blocks, _SURFACE_ROWS, _SURFACE_TEXELS, 4)
+    return by_block.transpose(1, 0, 2, 3).reshape(_SURFACE_ROWS, -1, 4)
 
 
 def draw_commands(ranges: np.ndarray, visible: np.ndarray) -> np.ndarray:
@@ -102,34 +129,33 @@ def in_view(
     return inside
 
 
-def _with_surfaces(mesh: Mesh, first_surface: int) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices that know their surface; a vertex used by two parts is doubled."""
-    part = np.zeros(len(mesh.vertices), np.int64)
+def _by_surface(mesh: Mesh) -> tuple[np.ndarray | None, np.ndarray, np.ndarray]:
+    """(which vertices, their parts, indices): a vertex of two parts is doubled. None: all as they are."""
+    part = np.zeros(len(mesh.vertices), np.uint32)
     part[mesh.faces] = mesh.face_parts[:, None]
-    index, faces = np.arange(len(part)), mesh.faces
-    if (part[faces] != mesh.face_parts[:, None]).any():
-        key = mesh.faces.astype(np.int64) * len(mesh.part_names) + mesh.face_parts[:, None]
-        unique, inverse = np.unique(key, return_inverse=True)
-        index, part = np.divmod(unique, len(mesh.part_names))
-        faces = inverse.reshape(-1, 3)
-    vertices = np.empty(len(index), VERTEX)
-    vertices["position"] = mesh.vertices[index]
-    vertices["normal"] = mesh.normals[index]
-    vertices["surface"] = part + first_surface
-    return vertices, faces.astype(np.uint32).ravel()
+    if (part[mesh.faces] == mesh.face_parts[:, None]).all():
+        return None, part, mesh.faces.astype(np.uint32).ravel()
+    key = mesh.faces.astype(np.int64) * len(mesh.part_names) + mesh.face_parts[:, None]
+    unique, inverse = np.unique(key, return_inverse=True)
+    index, part = np.divmod(unique, len(mesh.part_names))
+    return index, part.astype(np.uint32), inverse.astype(np.uint32).ravel()
 
 
-def _in_world(points: np.ndarray, transform: Transform) -> np.ndarray:
-    """(V, 3) float32: rotation (points * scale) + position."""
-    matrix = (rotation_matrix(*transform.rotation_deg) * transform.scale).astype(np.float32)
-    return points @ matrix.T + np.array(transform.position_m, np.float32)
+def _in_world(drawable: Drawable, index: np.ndarray | None, time_s: float) -> tuple[np.ndarray, np.ndarray]:
+    """(V, 3) float32 points rotation (points * scale) + position, and their unit normals."""
+    points, normals = drawable.mesh.vertices, drawable.mesh.normals
+    if index is not None:
+        points, normals = points[index], normals[index]
+    (rotation, position), scale = drawable.pose(time_s), np.array(drawable.transform.scale)
+    world = points @ (rotation * scale).astype(np.float32).T + position.astype(np.float32)
+    turned = normals @ (rotation / scale).astype(np.float32).T
+    turned /= np.maximum(np.sqrt(np.einsum("ij,ij->i", turned, turned))[:, None], np.float32(1e-20))
+    return world, turned
 
 
-def _surface(drawable: Drawable, material: Material, layer: Layer) -> np.ndarray:
+def _surface(drawable: Drawable, material: Material, layer: Layer, time_s: float) -> np.ndarray:
     surface = np.zeros((), SURFACE)
-    surface["place"][:, :3] = rotation_matrix(*drawable.transform.rotation_deg)
-    surface["place"][:, 3] = drawable.transform.position_m
-    surface["scale"] = drawable.transform.scale
+    surface["place"][:, :3], surface["place"][:, 3] = drawable.pose(time_s)
     surface["tiles_per_m"] = 1.0 / material.tile_m
     surface["colour_a"], surface["colour_b"], surface["colour_c"] = material.colours
     turn = np.radians(material.rotation_deg)
@@ -138,13 +164,24 @@ def _surface(drawable: Drawable, material: Material, layer: Layer) -> np.ndarray
     surface["layer"] = layer.index
     surface["slope_scale"] = layer.slope_scale * material.relief_scale
     surface["specular"] = drawable.specular
+    surface["clearcoat"] = material.clearcoat
+    surface["clearcoat_alpha"] = max(material.clearcoat_roughness, _SMOOTHEST) ** 2
+    surface["sheen"] = material.sheen
+    surface["translucency"] = material.translucency
+    surface["glow"] = drawable.glow
+    surface["emission"] = material.emission
+    surface["transmission"] = material.transmission
     surface["object_id"] = drawable.object_id + 1
     return surface
 
 
-def _sphere(mesh: Mesh, transform: Transform) -> tuple[float, float, float, float]:
-    low, high = mesh.vertices.min(0), mesh.vertices.max(0)
-    scale = np.array(transform.scale)
-    centre = rotation_matrix(*transform.rotation_deg) @ ((low + high) / 2 * scale) + transform.position_m
-    x, y, z = (float(c) for c in centre)
+_SMOOTHEST = 0.18
+"""MIN_ROUGHNESS in shaders/material.glsl: bounds the highlights of lights without size."""
+
+
+def _sphere(drawable: Drawable, time_s: float) -> tuple[float, float, float, float]:
+    low, high = drawable.mesh.vertices.min(0), drawable.mesh.vertices.max(0)
+    scale = np.array(drawable.transform.scale)
+    rotation, position = drawable.pose(time_s)
+    x, y, z = (float(c) for c in rotation @ ((low + high) / 2 * scale) + position)
     return (x, y, z, float(np.linalg.norm((high - low) * scale) / 2))

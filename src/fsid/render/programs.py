@@ -7,15 +7,20 @@ from importlib.resources import files
 import moderngl
 
 _SHADERS = files("fsid.render") / "shaders"
-_INCLUDES = ("surfaces.glsl", "encoding.glsl", "lights.glsl", "room.glsl")
+_INCLUDES = ("encoding.glsl", "surfaces.glsl", "material.glsl", "lights.glsl", "room.glsl", "lens.glsl")
 
 
-def load_program(context: moderngl.Context, vertex: str, fragment: str | None) -> moderngl.Program:
-    """A program of two files; without a fragment shader it writes depth only."""
+def load_program(
+    context: moderngl.Context, vertex: str, fragment: str | None, **defines: int
+) -> moderngl.Program:
+    """A program of two files; without a fragment shader it writes depth only. defines: for the fragments."""
     _register(context)
-    return context.program(
-        vertex_shader=_source(vertex), fragment_shader=None if fragment is None else _source(fragment)
-    )
+    source = None if fragment is None else _source(fragment)
+    if source is not None:
+        lines = "".join(f"#define {name} {value}\n" for name, value in defines.items())
+        version, rest = source.split("\n", 1)
+        source = f"{version}\n{lines}{rest}"
+    return context.program(vertex_shader=_source(vertex), fragment_shader=source)
 
 
 def load_compute(context: moderngl.Context, name: str) -> moderngl.ComputeShader:

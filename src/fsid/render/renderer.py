@@ -1,10 +1,9 @@
-"""Scene -> Frame in five passes, all with fixed taps, so that an image holds no noise:
+"""Scene -> Frame in passes with fixed taps, so that an image holds no noise:
 
-    shadows     depth from every light into one atlas
-    prepass     depth from the camera, `supersampling`^2 samples per pixel
-    surfaces    materials into the G-buffer, where the depth is equal
-    occlusion   openness of each pixel to the room
-    lighting    radiance of each pixel, averaged over its samples; the result is read back
+    shadows     depth from every light into one atlas, and its moments
+    samples     surface, normal and depth of `supersampling`^2 samples per pixel
+    occlusion   openness of each block of 2 x 2 pixels to its surroundings
+    shading     materials and radiance of each pixel, once per surface in it; the result is read back
 
 The same scene gives the same bits on the same driver whatever was rendered before: buffers that depend on
 what is resident (texture slots) are addressed by whole numbers, and everything else is made anew or cleared.
@@ -13,6 +12,7 @@ what is resident (texture slots) are addressed by whole numbers, and everything 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, ClassVar, Self
 
@@ -21,16 +21,20 @@ import numpy as np
 
 from fsid.assets import bake_material
 from fsid.errors import FsidError
+from fsid.render.buffers import Buffers
 from fsid.render.camera import NEAR_M, Lens, lens_of
 from fsid.render.context import GlInfo, gl_info, open_context
-from fsid.render.drawable import View, view_of
+from fsid.render.drawable import BACKGROUND_ID, Drawable, View, view_of
 from fsid.render.frame import Frame
 from fsid.render.geometry import Geometry, draw_commands, in_view, merge
+from fsid.render.lamps import lamps_of
 from fsid.render.layers import Bake, Layer, LayerStore
 from fsid.render.programs import load_program
-from fsid.render.room import Room, light_room
+from fsid.render.quality import QUALITIES, tap_table
+from fsid.render.room import Room, light_room, light_sky
+from fsid.render.shadows import COLUMNS, ShadowPlan, Source, plan_shadows
 from fsid.render.shadows import NEAR_M as SHADOW_NEAR_M
-from fsid.render.shadows import ShadowPlan, plan_shadows
+from fsid.render.sky import panorama
 from fsid.render.targets import ShadowAtlas, Targets
 from fsid.scene.model import Material, Scene
 
@@ -38,18 +42,44 @@ Mark = Callable[[str], None]
 """Called with the name of each stage when it has been issued; the benchmark measures with it."""
 
 
+@dataclass(frozen=True)
+class _Shot:
+    """One pass over a view. shift: of the G-buffer, half image sizes; shift_px: of the image, pixels.
+
+    lens_offset: shift of the rays by the place on the lens, normalised coordinates.
+    """
+
+    lens: Lens
+    time_s: float
+    shift_px: tuple[float, float] = (0.0, 0.0)
+    lens_offset: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def seen_shift(self) -> tuple[float, float]:
+        """Shift of the G-buffer that keeps its samples on those of the image, half image sizes."""
+        (x, y), focal, size = self.shift_px, self.lens.seen_focal, self.lens.seen_px
+        a, b = self.lens_offset
+        return (2 * x / size[0] + a * focal[0], 2 * y / size[1] - b * focal[1])
+
+
 class Renderer:
     """Owns the process's one OpenGL context and what is resident on it. Use it in a `with` block.
 
     device_index: EGL device; None takes the first GPU, or else the CPU. supersampling: edge of the square
     grid of samples per pixel, 1..4. texture_size: texels per side of a material tile, a power of two.
+    quality: "high", or "fast" with fewer taps and coarser shadow maps (docs/render.md has both measured).
     Raises FsidError where OpenGL 4.3 is missing or a second Renderer is opened in one process.
     """
 
     _active: ClassVar[Renderer | None] = None
 
     def __init__(
-        self, *, device_index: int | None = None, supersampling: int = 2, texture_size: int = 1024
+        self,
+        *,
+        device_index: int | None = None,
+        supersampling: int = 2,
+        texture_size: int = 1024,
+        quality: str = "high",
     ) -> None:
         if Renderer._active is not None:
             raise FsidError(
@@ -59,27 +89,35 @@ class Renderer:
             raise FsidError(f"supersampling {supersampling}: must be 1 .. 4")
         if not 64 <= texture_size <= 8192 or texture_size & (texture_size - 1):
             raise FsidError(f"texture_size {texture_size}: must be a power of two from 64 to 8192")
+        if quality not in QUALITIES:
+            raise FsidError(f"quality '{quality}': use {' or '.join(QUALITIES)}")
+        self._quality = QUALITIES[quality]
+        self._grid = supersampling
         self._context = open_context(device_index)
         Renderer._active = self
         try:
-            self._prepare(supersampling, texture_size)
+            self._prepare(texture_size)
         except BaseException:
             self.close()
             raise
 
-    def _prepare(self, supersampling: int, texture_size: int) -> None:
+    def _prepare(self, texture_size: int) -> None:
         context = self._context
         self._layers = LayerStore(context, texture_size)
         self._depth = load_program(context, "depth.vert", None)
         self._moments = load_program(context, "screen.vert", "moments.frag")
-        self._surface = load_program(context, "surface.vert", "surface.frag")
+        self._visible = load_program(context, "visible.vert", "visible.frag")
+        self._block_depth = load_program(context, "screen.vert", "block_depth.frag")
         self._occlusion = load_program(context, "screen.vert", "occlusion.frag")
         self._blur = load_program(context, "screen.vert", "blur.frag")
-        self._lighting = load_program(context, "screen.vert", "lighting.frag")
-        self._targets = Targets(context, supersampling)
+        self._shades: dict[int, moderngl.Program] = {}
+        self._targets = Targets(context, self._grid)
         self._atlas = ShadowAtlas(context)
-        _set(self._occlusion, grid=supersampling, taps=_spiral(32, 1.0))
-        _set(self._lighting, grid=supersampling, search_taps=_spiral(12), filter_taps=_spiral(20))
+        taps = tap_table(self._quality)
+        self._taps = context.texture((taps.shape[1], taps.shape[0]), 2, taps.tobytes(), dtype="f4")
+        self._taps.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        for program in (self._block_depth, self._occlusion):
+            _set(program, stride=2 * self._grid, taps=self._quality.occlusion_taps)
 
     @property
     def info(self) -> GlInfo:
@@ -123,151 +161,193 @@ class Renderer:
         """
         if Renderer._active is not self:
             raise FsidError("this Renderer is closed")
-        lens, camera = lens_of(view.camera), view.camera
-        layers = self._layers.load([(m.family, m.variant) for d in view.drawables for m in d.materials], bake)
-        geometry = merge(view.drawables, lambda m: layers[m.family, m.variant])
-        plan = plan_shadows(view.lights)
-        room = light_room(view.room_size_m, _room_albedo(view, layers), view.lights, view.ambient)
-        mark("scene build")
-        self._targets.resize(camera.width, camera.height)
-        self._atlas.resize(plan.size)
-        shift = (2 * shift_px[0] / camera.width, 2 * shift_px[1] / camera.height)
-        buffers = _Buffers(self._context, geometry, plan, room)
-        try:
-            mark("upload")
-            self._draw_shadows(geometry, plan, buffers)
-            mark("shadows")
-            self._draw_surfaces(geometry, lens, shift, buffers)
-            mark("geometry")
-            self._light(lens, plan, room, shift_px, buffers)
-            self._context.finish()
-            mark("shading")
-            return self._targets.read_frame()
-        finally:
-            buffers.release()
-            mark("readback")
+        camera = view.camera
+        shot = _Shot(lens_of(camera), camera.time_s, shift_px)
+        self._draw(view, shot, bake, mark)
+        frame = self._targets.read_frame()
+        mark("readback")
+        return frame
 
     def wait(self) -> None:
         """Return when everything issued so far is done; only measuring needs it."""
         self._context.finish()
 
-    def _draw_shadows(self, geometry: Geometry, plan: ShadowPlan, buffers: _Buffers) -> None:
+    def _draw(self, view: View, shot: _Shot, bake: Bake, mark: Mark) -> None:
+        """One pass over a view; the result stays in the targets."""
+        layers = self._layers.load([(m.family, m.variant) for d in view.drawables for m in d.materials], bake)
+
+        def albedo_of(material: Material) -> np.ndarray:
+            return _mean_albedo(material, layers[material.family, material.variant])
+
+        geometry = merge(view.drawables, lambda m: layers[m.family, m.variant], shot.time_s)
+        sources = [Source(light) for light in view.lights]
+        sources += lamps_of(view.drawables, albedo_of, shot.time_s)
+        casts = np.array([drawable.casts and not drawable.is_glass for drawable in view.drawables])
+        movable = np.array([_shades_outdoors(drawable, view) for drawable in view.drawables])
+        plan = plan_shadows(
+            sources, geometry.spheres[casts & movable], geometry.spheres, self._quality.shadow_px
+        )
+        sky = None if view.sky is None else panorama(view.sky)
+        room = light_sky(sky) if sky is not None else _lit_room(view, sources, albedo_of)
+        camera = view.camera
+        mark("scene build")
+        self._targets.resize((camera.width, camera.height), shot.lens.seen_px)
+        self._atlas.resize(plan.size)
+        buffers = Buffers(self._context, geometry, plan, room, sky)
+        try:
+            mark("upload")
+            self._draw_shadows(geometry, plan, buffers, casts)
+            mark("shadows")
+            self._draw_samples(geometry, shot, buffers)
+            mark("samples")
+            self._draw_occlusion(shot, buffers)
+            mark("occlusion")
+            self._shade(view, shot, plan, room, sky, buffers)
+            self._context.finish()
+            mark("shading")
+        finally:
+            buffers.release()
+
+    def _draw_shadows(
+        self, geometry: Geometry, plan: ShadowPlan, buffers: Buffers, casts: np.ndarray
+    ) -> None:
         self._context.enable_only(moderngl.DEPTH_TEST)
         self._atlas.begin()
         array = buffers.vertex_array(self._depth)
-        _set(self._depth, near=SHADOW_NEAR_M, shift=(0.0, 0.0))
+        _set(self._depth, near=SHADOW_NEAR_M)
         for tile in plan.tiles:
             tangent = 1.0 / tile.focal
-            seen = np.flatnonzero(in_view(geometry.spheres, tile.origin, tile.axes, (tangent, tangent)))
-            if not len(seen):
-                continue
+            seen = casts.copy()
+            if tile.range_m == 0:
+                seen &= in_view(geometry.spheres, tile.origin, tile.axes, (tangent, tangent))
+            if tile.lamp >= 0:
+                seen[tile.lamp] = False
             self._atlas.framebuffer.viewport = (*tile.corner, plan.tile_px, plan.tile_px)
-            _set(self._depth, origin=tile.origin, axes=tile.axes.T, focal=(tile.focal, tile.focal))
-            buffers.draw(array, draw_commands(geometry.ranges, seen))
+            _set(self._depth, origin=tile.origin, axes=tile.axes.T, focal=tile.focal, range_m=tile.range_m)
+            buffers.draw(array, draw_commands(geometry.ranges, np.flatnonzero(seen)))
         self._context.enable_only(moderngl.NOTHING)
-        _set(self._moments, near=SHADOW_NEAR_M)
         self._atlas.begin_moments()
         buffers.draw_screen(self._moments)
         self._atlas.end_moments()
 
-    def _draw_surfaces(
-        self, geometry: Geometry, lens: Lens, shift: tuple[float, float], buffers: _Buffers
-    ) -> None:
-        tangents = (1.0 / lens.focal[0] + abs(shift[0]), 1.0 / lens.focal[1] + abs(shift[1]))
-        seen = np.flatnonzero(in_view(geometry.spheres, lens.position, lens.rotation, tangents))
+    def _draw_samples(self, geometry: Geometry, shot: _Shot, buffers: Buffers) -> None:
+        lens, shift = shot.lens, shot.seen_shift
+        tangents = tuple((1 + abs(s)) / f for s, f in zip(shift, lens.seen_focal, strict=True))
+        seen = np.flatnonzero(
+            in_view(geometry.spheres, lens.position, lens.rotation, (tangents[0], tangents[1]))
+        )
         distance = (
             np.linalg.norm(geometry.spheres[seen, :3] - lens.position, axis=1) - geometry.spheres[seen, 3]
         )
         commands = draw_commands(geometry.ranges, seen[np.argsort(distance, kind="stable")])
-        for program in (self._depth, self._surface):
-            focal = (lens.focal[0], -lens.focal[1])
-            _set(program, origin=lens.position, axes=lens.rotation.T, focal=focal, shift=shift, near=NEAR_M)
+        focal = (lens.seen_focal[0], -lens.seen_focal[1])
+        _set(self._visible, origin=lens.position, axes=lens.rotation.T, focal=focal, shift=shift, near=NEAR_M)
         self._context.enable_only(moderngl.DEPTH_TEST)
-        self._targets.begin_depth()
-        buffers.draw(buffers.vertex_array(self._depth), commands)
-        self._targets.begin_surfaces()
-        self._layers.use(0, 1)
-        self._context.depth_func = "=="
-        buffers.draw(buffers.vertex_array(self._surface), commands)
-        self._context.depth_func = "<"
+        self._targets.begin_samples()
+        buffers.draw(buffers.vertex_array(self._visible), commands)
 
-    def _light(
-        self, lens: Lens, plan: ShadowPlan, room: Room, shift_px: tuple[float, float], buffers: _Buffers
-    ) -> None:
+    def _draw_occlusion(self, shot: _Shot, buffers: Buffers) -> None:
         self._context.enable_only(moderngl.NOTHING)
-        common = {"focal": lens.focal, "axes": lens.rotation.T, "size": self._targets.size}
-        _set(self._occlusion, **common)
+        self._targets.begin_block_depth()
+        buffers.draw_screen(self._block_depth)
+        blocks, lens = self._targets.blocks, shot.lens
+        _set(
+            self._occlusion,
+            focal=lens.seen_focal,
+            axes=lens.rotation.T,
+            size=blocks,
+            shift=shot.seen_shift,
+        )
         self._targets.begin_occlusion()
+        self._taps.use(7)
         buffers.draw_screen(self._occlusion)
         for back in (False, True):
-            _set(self._blur, direction=(0, 1) if back else (1, 0), size=self._targets.size)
+            _set(self._blur, direction=(0, 1) if back else (1, 0), size=blocks)
             self._targets.begin_blur(back=back)
             buffers.draw_screen(self._blur)
+
+    def _shade(
+        self,
+        view: View,
+        shot: _Shot,
+        plan: ShadowPlan,
+        room: Room,
+        sky: np.ndarray | None,
+        buffers: Buffers,
+    ) -> None:
+        lens, camera = shot.lens, view.camera
+        pixel_rad = 2.0 / (lens.focal[0] * camera.width)
+        level = -1.0 if sky is None else max(float(np.log2(pixel_rad * len(sky) / np.pi)), 0.0)
+        program = self._shade_program(lens.model)
         _set(
-            self._lighting,
-            **common,
+            program,
+            grid=self._grid,
+            size=self._targets.size,
+            seen=self._targets.seen,
+            focal=lens.focal,
+            seen_focal=lens.seen_focal,
+            seen_shift=shot.seen_shift,
+            shift=shot.shift_px,
+            lens_offset=shot.lens_offset,
+            k=lens.k,
+            axes=lens.rotation.T,
             origin=lens.position,
-            shift=shift_px,
             light_count=plan.light_count,
             tile_px=float(plan.tile_px),
+            tile_columns=COLUMNS,
+            search_taps=self._quality.search_taps,
+            filter_taps=self._quality.filter_taps,
+            max_probes=self._quality.probes,
             ambient_sides=room.sides,
             mean_sides=room.radiance.mean((1, 2)),
-            room_half=np.array(room.size_m) / 2,
+            room_half=room.half_m,
+            room_centre=room.centre_m,
+            sky_level=level,
+            vignetting=camera.vignetting,
+            magnification=1.0,
         )
-        self._targets.begin_lighting()
+        self._targets.begin_shading()
+        self._layers.use(0, 1)
         self._atlas.use(compare_unit=2, moments_unit=3)
-        buffers.room.use(4)
-        buffers.draw_screen(self._lighting)
+        self._taps.use(7)
+        buffers.use()
+        red, blue = camera.chromatic_aberration
+        for aberration, colours in _colour_passes(red, blue):
+            self._targets.mask(*colours)
+            _set(program, magnification=1.0 + aberration)
+            buffers.draw_screen(program)
+
+    def _shade_program(self, lens_model: int) -> moderngl.Program:
+        if lens_model not in self._shades:
+            self._shades[lens_model] = load_program(
+                self._context, "screen.vert", "shade.frag", LENS=lens_model
+            )
+        return self._shades[lens_model]
 
 
-class _Buffers:
-    """What one view keeps on the device while it is drawn."""
+def _colour_passes(red: float, blue: float) -> list[tuple[float, tuple[bool, bool, bool]]]:
+    """(magnification - 1, which of R, G, B) of each pass; labels belong to green."""
+    if red == blue == 0.0:
+        return [(0.0, (True, True, True))]
+    return [(red, (True, False, False)), (0.0, (False, True, False)), (blue, (False, False, True))]
 
-    def __init__(self, context: moderngl.Context, geometry: Geometry, plan: ShadowPlan, room: Room) -> None:
-        self._context = context
-        self._world = context.buffer(geometry.world.tobytes())
-        self._vertices = context.buffer(geometry.vertices.tobytes())
-        self._indices = context.buffer(geometry.indices.tobytes())
-        self._owned: list[Any] = [self._world, self._vertices, self._indices]
-        for binding, table in enumerate((geometry.surfaces, plan.table)):
-            buffer = context.buffer(table.tobytes())
-            buffer.bind_to_storage_buffer(binding)
-            self._owned.append(buffer)
-        sides, height, width, _ = room.radiance.shape
-        texels = np.concatenate([room.radiance, np.ones((*room.radiance.shape[:3], 1))], axis=-1)
-        self.room = context.texture_array(
-            (width, height, sides), 4, texels.astype("f4").tobytes(), dtype="f4"
-        )
-        self.room.build_mipmaps()
-        self.room.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
-        self.room.repeat_x = self.room.repeat_y = False
-        self._owned.append(self.room)
 
-    def vertex_array(self, program: moderngl.Program) -> moderngl.VertexArray:
-        """The geometry as input of a program: positions in the world, and the rest where it is asked for."""
-        content: list[tuple[Any, ...]] = [(self._world, "3f", "in_world")]
-        if "in_surface" in program:
-            content.append((self._vertices, "3f 3f 1u", "in_position", "in_normal", "in_surface"))
-        array = self._context.vertex_array(program, content, self._indices)
-        self._owned.append(array)
-        return array
+def _shades_outdoors(drawable: Drawable, view: View) -> bool:
+    """Whether the sun's shadow map must hold it: the ground out of doors shades nothing that matters."""
+    return view.sky is None or drawable.object_id != BACKGROUND_ID
 
-    def draw(self, array: moderngl.VertexArray, commands: np.ndarray) -> None:
-        """One indirect draw of (n, 5) commands."""
-        buffer = self._context.buffer(commands.tobytes())
-        array.render_indirect(buffer, moderngl.TRIANGLES, count=len(commands))
-        self._owned.append(buffer)
 
-    def draw_screen(self, program: moderngl.Program) -> None:
-        """Every pixel of the bound target once."""
-        array = self._context.vertex_array(program, [])
-        array.render(moderngl.TRIANGLES, vertices=3)
-        self._owned.append(array)
+def _lit_room(view: View, sources: Sequence[Source], albedo_of: Callable[[Material], np.ndarray]) -> Room:
+    albedo, glow = np.ones((6, 3)), np.zeros((6, 3))
+    if view.room_materials:
+        albedo = np.stack([albedo_of(material) for material in view.room_materials])
+        glow = albedo * np.array([[material.emission] for material in view.room_materials])
+    lights = [source.light for source in sources]
+    return light_room(view.room_size_m, view.room_floor_m, albedo, glow, lights, view.ambient)
 
-    def release(self) -> None:
-        """Free all of it."""
-        for item in self._owned:
-            item.release()
+
+def _mean_albedo(material: Material, layer: Layer) -> np.ndarray:
+    return np.clip(layer.shares @ np.array(material.colours), 0.0, 1.0)
 
 
 def _set(program: moderngl.Program, **values: Any) -> None:
@@ -279,21 +359,3 @@ def _set(program: moderngl.Program, **values: Any) -> None:
                 uniform.write(value.astype("f4").tobytes())
             else:
                 uniform.value = value
-
-
-def _spiral(count: int, growth: float = 0.5) -> np.ndarray:
-    """(count, 2) points of a sunflower spiral on the unit disc (Vogel 1979); radius ~ index^growth."""
-    i = np.arange(count)
-    radius, angle = ((i + 0.5) / count) ** growth, i * np.pi * (3 - np.sqrt(5))
-    return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
-
-
-def _room_albedo(view: View, layers: dict[tuple[str, int], Layer]) -> np.ndarray:
-    """(6, 3) mean albedo of the sides of the room."""
-    if not view.room_materials:
-        return np.ones((6, 3))
-    return np.array([_mean_albedo(m, layers[m.family, m.variant]) for m in view.room_materials])
-
-
-def _mean_albedo(material: Material, layer: Layer) -> Sequence[float]:
-    return np.clip(layer.shares @ np.array(material.colours), 0.0, 1.0)

@@ -1,10 +1,15 @@
-"""The room as a light source: what its six sides send back, for the ambient light and for reflections.
+"""The surroundings as a light source: what comes from six sides, for the ambient light and for reflections.
+
+In a room:
 
     radiance of a wall point = mean albedo * (E_direct / pi + ambient)      E_direct: lights, without shadows
 
 is laid out on a coarse grid per side; a metal reflects it (so metals are never black). The ambient light
 has the colour of `Scene.ambient` times that of each side (one bounce), normalised so that the mean over the
 six sides has the luminance of `Scene.ambient`: a closed white room gives exactly `ambient` from everywhere.
+
+Out of doors the sides are the sky, so far away that places do not matter, and the ambient light is
+irradiance / pi towards each axis.
 """
 
 from __future__ import annotations
@@ -14,67 +19,112 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fsid.render.shadows import cone_cosines
+from fsid.render.shadows import cone_cosines, unit
 from fsid.scene.model import Light, Vec3
 
 GRID = 16
+SKY_GRID = 64
+SKY_HALF_M = 1e5
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
 @dataclass(frozen=True)
 class Room:
-    """size_m: x, y, z. sides: (6, 3) diffuse ambient radiance that arrives from +x -x +y -y +z -z.
+    """half_m, centre_m: (3,) of the box. sides: (6, 3) diffuse ambient radiance from +x -x +y -y +z -z.
 
-    radiance: (6, GRID, GRID, 3) of the walls, rows and columns along the axes (a + 2) % 3 and (a + 1) % 3.
+    radiance: (6, G, G, 3) of the walls, rows and columns along the axes (a + 2) % 3 and (a + 1) % 3.
     """
 
-    size_m: Vec3
+    half_m: np.ndarray
+    centre_m: np.ndarray
     sides: np.ndarray
     radiance: np.ndarray
 
 
-def light_room(size_m: Vec3, albedo: np.ndarray, lights: Sequence[Light], ambient: Vec3) -> Room:
-    """albedo: (6, 3) mean of each side. Lights and ambient as in `Scene`."""
-    direct = np.stack([_irradiance(size_m, side, lights) for side in range(6)])
-    radiance = albedo[:, None, None] * (direct / np.pi + np.array(ambient))
-    relative = (
-        albedo * (direct.mean((1, 2)) @ _LUMINANCE / np.pi + float(np.array(ambient) @ _LUMINANCE))[:, None]
-    )
-    level = float((relative @ _LUMINANCE).mean())
-    tint = relative / level if level > 0 else np.ones((6, 3))
-    return Room(size_m, tint * np.array(ambient), radiance)
+def light_room(
+    size_m: Vec3,
+    floor_m: float,
+    albedo: np.ndarray,
+    glow: np.ndarray,
+    lights: Sequence[Light],
+    ambient: Vec3,
+) -> Room:
+    """albedo, glow: (6, 3) mean albedo and own radiance of each side. Lights and ambient as in `Scene`."""
+    half = np.array(size_m, dtype=float) / 2
+    centre = np.array([0.0, 0.0, floor_m + half[2]])
+    direct = np.stack([_irradiance(half, centre, side, lights) for side in range(6)])
+    radiance = albedo[:, None, None] * (direct / np.pi + np.array(ambient)) + glow[:, None, None]
+    level = direct.mean((1, 2)) @ _LUMINANCE / np.pi + float(np.array(ambient) @ _LUMINANCE)
+    relative = albedo * level[:, None] + glow
+    mean = float((relative @ _LUMINANCE).mean())
+    tint = relative / mean if mean > 0 else np.ones((6, 3))
+    return Room(half, centre, tint * np.array(ambient) + glow, radiance)
 
 
-def _irradiance(size_m: Vec3, side: int, lights: Sequence[Light]) -> np.ndarray:
-    """(GRID, GRID, 3) irradiance of the grid points of one side."""
-    points, inward = _grid(size_m, side)
+def light_sky(panorama: np.ndarray) -> Room:
+    """panorama: (H, 2 H, 3) as `fsid.render.sky.panorama`."""
+    half = np.full(3, SKY_HALF_M)
+    directions = np.stack([_grid(half, np.zeros(3), side, SKY_GRID)[0] for side in range(6)]) / SKY_HALF_M
+    coarse = panorama
+    while len(coarse) > 2 * SKY_GRID and len(coarse) % 2 == 0:
+        coarse = (coarse[::2] + coarse[1::2]) / 2
+        coarse = (coarse[:, ::2] + coarse[:, 1::2]) / 2
+    norm = np.linalg.norm(directions, axis=-1)
+    unit_direction = directions / norm[..., None]
+    radiance = look_up(coarse, unit_direction)
+    cosines = np.einsum("sijk,ak->asij", unit_direction, _AXES)
+    weight = np.maximum(cosines, 0.0) / norm**3
+    total = weight.sum((1, 2, 3))[:, None]
+    sides = np.einsum("asij,sijc->ac", weight, radiance) / total
+    return Room(half, np.zeros(3), sides, radiance)
+
+
+def look_up(panorama: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """(..., 3) radiance of the nearest texel in each unit direction (..., 3)."""
+    height, width = panorama.shape[:2]
+    row = np.arccos(np.clip(direction[..., 2], -1, 1)) / np.pi * height
+    column = np.arctan2(direction[..., 1], direction[..., 0]) / (2 * np.pi) * width
+    return np.asarray(panorama[np.clip(row.astype(int), 0, height - 1), np.floor(column).astype(int) % width])
+
+
+def _irradiance(half: np.ndarray, centre: np.ndarray, side: int, lights: Sequence[Light]) -> np.ndarray:
+    """(GRID, GRID, 3) irradiance of the grid points of one side. The sun comes through no wall."""
+    points, inward = _grid(half, centre, side, GRID)
     total = np.zeros((GRID, GRID, 3))
     for light in lights:
+        if light.kind == "sun":
+            continue
         to_light = np.array(light.position_m) - points
         distance = np.maximum(np.linalg.norm(to_light, axis=-1), max(light.radius_m, 0.05))
         cosine = np.maximum(to_light @ inward / distance, 0.0)
-        cone = _cone(light, -to_light / distance[..., None])
-        total += (cosine * cone / distance**2)[..., None] * np.array(light.colour)
+        shape = _shape(light, -to_light / distance[..., None])
+        area = light.size_m[0] * light.size_m[1]
+        reach2 = distance**2 + (area / np.pi if light.kind == "area" else 0.0)
+        total += (cosine * shape / reach2)[..., None] * np.array(light.colour)
     return total
 
 
-def _cone(light: Light, direction: np.ndarray) -> np.ndarray:
-    """Strength of a spot by direction, as `arriving` in shaders/lights.glsl."""
-    if light.kind != "spot":
+def _shape(light: Light, direction: np.ndarray) -> np.ndarray:
+    """Strength of a light by direction: a spot as in shaders/lights.glsl, an area by its cosine."""
+    if light.kind == "point":
         return np.ones(direction.shape[:-1])
+    along = direction @ unit(np.array(light.direction))
+    if light.kind == "area":
+        return np.maximum(along, 0.0) * light.size_m[0] * light.size_m[1]
     outer, inner = cone_cosines(light)
-    along = direction @ (np.array(light.direction) / np.linalg.norm(light.direction))
     t = np.clip((along - outer) / (inner - outer), 0.0, 1.0)
     return t * t * (3 - 2 * t)
 
 
-def _grid(size_m: Vec3, side: int) -> tuple[np.ndarray, np.ndarray]:
-    """Cell centres of one side (GRID, GRID, 3) in the world, and the normal into the room."""
+def _grid(half: np.ndarray, centre: np.ndarray, side: int, cells: int) -> tuple[np.ndarray, np.ndarray]:
+    """Cell centres of one side (cells, cells, 3) in the world, and the normal into the room."""
     axis, sign = side // 2, 1.0 - 2.0 * (side % 2)
-    at = (np.arange(GRID) + 0.5) / GRID * 2 - 1
-    points = np.zeros((GRID, GRID, 3))
+    at = (np.arange(cells) + 0.5) / cells * 2 - 1
+    points = np.zeros((cells, cells, 3))
     points[..., axis] = sign
     points[..., (axis + 1) % 3] = at[None, :]
     points[..., (axis + 2) % 3] = at[:, None]
-    half = np.array(size_m) / 2
-    return points * half + (0, 0, half[2]), -sign * np.eye(3)[axis]
+    return points * half + centre, -sign * np.eye(3)[axis]
+
+
+_AXES = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], dtype=float)

@@ -1,8 +1,9 @@
 """Shadow maps: depth as seen from each light, in the square tiles of one atlas.
 
-A spot needs one tile along its direction, a point light six (the sides of a cube). Every tile shows a border
-beyond its own field, so that the taps of a soft shadow never leave it. Window depth is 1 - near / z, in which
-the plane of the receiver is linear over the tile: each tap compares against that plane (no acne on slopes).
+A spot and the sun need one tile along their direction, a point or area light six (the sides of a cube). Every
+tile shows a border beyond its own field, so that the taps of a soft shadow never leave it. What is stored is
+the window depth, 1 - near / z, or z / range of the sun: the plane of the receiver is linear in both over the
+tile, and each tap compares against that plane (no acne on slopes).
 Nothing here depends on what was rendered before: the atlas has the size that this scene's lights need.
 """
 
@@ -16,11 +17,13 @@ import numpy as np
 from fsid.scene.model import Light
 
 BORDER = 0.17
-"""Width of a tile's border in tangent units; MAX_FILTER in shaders/lights.glsl stays below it."""
+"""Width of a tile's border in tangent units; a large area light has a wider one."""
 
 NEAR_M = 0.02
+COLUMNS = 6
+KINDS = {"point": 0, "spot": 0, "sun": 1, "area": 2}
 _WIDEST_SPOT_DEG = 120.0
-_COLUMNS = 6
+_WIDEST_BORDER = 0.7
 
 LIGHT = np.dtype(
     [
@@ -32,23 +35,40 @@ LIGHT = np.dtype(
         ("cos_inner", "f4"),
         ("right", "3f4"),
         ("focal", "f4"),
-        ("up", "4f4"),
-        ("first_tile", "i4"),
-        ("tile_count", "i4"),
-        ("padding", "2i4"),
+        ("up", "3f4"),
+        ("border", "f4"),
+        ("kind", "f4"),
+        ("first_tile", "f4"),
+        ("tile_count", "f4"),
+        ("range_m", "f4"),
+        ("half_width", "4f4"),
+        ("half_height", "4f4"),
     ]
 )
-"""std430 layout of `struct Light` in shaders/lights.glsl."""
+"""Eight texels of `struct Light` in shaders/lights.glsl."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """A light, and the number of the drawable (-1: none) that is the lamp itself and casts no shadow."""
+
+    light: Light
+    lamp: int = -1
 
 
 @dataclass(frozen=True)
 class Tile:
-    """origin: (3,) metres. axes: (3, 3) rows right, up, forward. focal: in half tiles. corner: texels."""
+    """origin: (3,) metres. axes: (3, 3) rows right, up, forward. focal: in half tiles. corner: texels.
+
+    range_m: depth of a parallel tile (the sun's), 0 for a perspective one. lamp: as in `Source`.
+    """
 
     origin: np.ndarray
     axes: np.ndarray
     focal: float
     corner: tuple[int, int]
+    range_m: float
+    lamp: int
 
 
 @dataclass(frozen=True)
@@ -62,50 +82,105 @@ class ShadowPlan:
     table: np.ndarray
 
 
-def plan_shadows(lights: Sequence[Light]) -> ShadowPlan:
-    """Tiles of every light: 1024 texels a side for up to four point lights, 512 for more."""
-    fields = [_fields(light) for light in lights]
+@dataclass(frozen=True)
+class _Field:
+    """What one tile shows: as `Tile`, half: half of its field without the border, tangent units or metres."""
+
+    origin: np.ndarray
+    axes: np.ndarray
+    half: float
+    range_m: float = 0.0
+
+
+def plan_shadows(
+    sources: Sequence[Source], casters: np.ndarray, scene: np.ndarray, finest_px: int
+) -> ShadowPlan:
+    """Tiles of every light: finest_px texels a side for up to four point lights, half of it for more.
+
+    casters, scene: (N, 4) spheres of what can cast a shadow, and of everything.
+    """
+    fields = [_fields(source.light, casters, scene) for source in sources]
     count = sum(len(f) for f in fields)
-    tile_px = 1024 if count <= 4 * len(_SIDES) else 512
+    tile_px = finest_px if count <= 4 * len(_SIDES) else finest_px // 2
     tiles: list[Tile] = []
-    table = np.zeros(max(1, len(lights)), LIGHT)
-    for light, field, row in zip(lights, fields, table, strict=False):
+    table = np.zeros(max(1, len(sources)), LIGHT)
+    for source, field, row in zip(sources, fields, table, strict=False):
         first = len(tiles)
-        for axes, half_tan in field:
-            y, x = divmod(len(tiles), _COLUMNS)
-            corner = (x * tile_px, y * tile_px)
-            tiles.append(Tile(np.array(light.position_m), axes, 1.0 / (half_tan + BORDER), corner))
-        _fill(row, light, first, tiles[first:])
-    size = (max(1, min(count, _COLUMNS)) * tile_px, max(1, -(-count // _COLUMNS)) * tile_px)
-    return ShadowPlan(tiles, size, tile_px, len(lights), table)
+        border = _border(source.light, field)
+        for f in field:
+            y, x = divmod(len(tiles), COLUMNS)
+            focal = 1.0 / (f.half + border)
+            tiles.append(Tile(f.origin, f.axes, focal, (x * tile_px, y * tile_px), f.range_m, source.lamp))
+        _fill(row, source.light, border, first, tiles[first:])
+    size = (max(1, min(count, COLUMNS)) * tile_px, max(1, -(-count // COLUMNS)) * tile_px)
+    return ShadowPlan(tiles, size, tile_px, len(sources), table)
 
 
-def _fields(light: Light) -> list[tuple[np.ndarray, float]]:
-    """(axes, tangent of the half field) of each tile of a light."""
+def half_axes(light: Light) -> tuple[np.ndarray, np.ndarray]:
+    """Half width and half height of an area light as vectors in the world."""
+    direction = unit(np.array(light.direction))
+    width = np.cross(direction, (0.0, 0.0, 1.0))
+    width = np.array([1.0, 0.0, 0.0]) if np.linalg.norm(width) < 1e-6 else unit(width)
+    height = np.cross(width, direction)
+    return width * light.size_m[0] / 2, height * light.size_m[1] / 2
+
+
+def unit(vector: np.ndarray) -> np.ndarray:
+    """`vector` with length one; the null vector stays."""
+    return vector / max(float(np.linalg.norm(vector)), 1e-12)
+
+
+def _fields(light: Light, casters: np.ndarray, scene: np.ndarray) -> list[_Field]:
+    if light.kind == "sun":
+        return [_sun_field(light, casters, scene)]
+    origin = np.array(light.position_m, dtype=float)
     if light.kind == "spot" and light.cone_deg <= _WIDEST_SPOT_DEG:
-        return [(_axes_along(np.array(light.direction)), float(np.tan(np.radians(light.cone_deg) / 2)))]
-    return [(axes, 1.0) for axes in _SIDES]
+        half = float(np.tan(np.radians(light.cone_deg) / 2))
+        return [_Field(origin, _axes_along(np.array(light.direction)), half)]
+    return [_Field(origin, axes, 1.0) for axes in _SIDES]
+
+
+def _sun_field(light: Light, casters: np.ndarray, scene: np.ndarray) -> _Field:
+    """A square along the sun's rays around all that casts shadows, deep enough for the whole scene."""
+    axes = _axes_along(np.array(light.direction))
+    inside = casters if len(casters) else scene
+    local = inside[:, :3] @ axes.T
+    low, high = (local - inside[:, 3:]).min(0), (local + inside[:, 3:]).max(0)
+    deepest = (scene[:, :3] @ axes[2] + scene[:, 3]).max()
+    origin = np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2] - 0.01]) @ axes
+    return _Field(origin, axes, float((high - low)[:2].max() / 2), float(deepest - low[2] + 0.02))
+
+
+def _border(light: Light, fields: Sequence[_Field]) -> float:
+    if light.kind == "sun":
+        return 0.02 * fields[0].half + light.radius_m * fields[0].range_m
+    if light.kind == "area":
+        return float(np.clip(np.hypot(*light.size_m) / 2, BORDER, _WIDEST_BORDER))
+    return BORDER
 
 
 def _axes_along(forward: np.ndarray) -> np.ndarray:
     """(3, 3) rows right, up, forward."""
-    forward = forward / np.linalg.norm(forward)
-    right = np.cross(forward, np.eye(3)[int(np.argmin(np.abs(forward)))])
-    right /= np.linalg.norm(right)
+    forward = unit(forward)
+    right = unit(np.cross(forward, np.eye(3)[int(np.argmin(np.abs(forward)))]))
     return np.stack([right, np.cross(right, forward), forward])
 
 
-def _fill(row: np.void, light: Light, first_tile: int, tiles: Sequence[Tile]) -> None:
-    row["position"], row["radius_m"], row["colour"] = light.position_m, light.radius_m, light.colour
-    row["direction"] = np.array(light.direction) / max(float(np.linalg.norm(light.direction)), 1e-12)
+def _fill(row: np.void, light: Light, border: float, first_tile: int, tiles: Sequence[Tile]) -> None:
+    row["position"] = tiles[0].origin
+    row["radius_m"], row["colour"] = light.radius_m, light.colour
+    row["direction"] = unit(np.array(light.direction))
     row["cos_outer"], row["cos_inner"] = cone_cosines(light)
-    row["right"], row["up"][:3] = tiles[0].axes[:2]
-    row["focal"] = tiles[0].focal
-    row["first_tile"], row["tile_count"] = first_tile, len(tiles)
+    row["right"], row["up"] = tiles[0].axes[:2]
+    row["focal"], row["border"], row["range_m"] = tiles[0].focal, border, tiles[0].range_m
+    row["kind"], row["first_tile"], row["tile_count"] = KINDS[light.kind], first_tile, len(tiles)
+    if light.kind == "area":
+        row["half_width"][:3], row["half_height"][:3] = half_axes(light)
+        row["radius_m"] = 0.5 * float(np.hypot(*light.size_m))
 
 
 def cone_cosines(light: Light) -> tuple[float, float]:
-    """Cosines at which a spot is dark and at full strength; below -1 for a point light."""
+    """Cosines at which a spot is dark and at full strength; below -1 for every other light."""
     if light.kind != "spot":
         return -2.0, -1.5
     half = np.radians(light.cone_deg) / 2

@@ -10,57 +10,71 @@ import numpy as np
 from fsid.errors import FsidError
 from fsid.render.frame import Frame
 
+_ID_LEVELS = 65535
+
 
 class Targets:
-    """G-buffer of grid^2 samples per pixel (24 bytes and depth each), occlusion and result per pixel."""
+    """G-buffer of grid^2 samples per pixel (20 bytes each), occlusion per 2 x 2 pixels, result per pixel."""
 
     def __init__(self, context: moderngl.Context, grid: int) -> None:
         self._context = context
         self._grid = grid
         self._owned: list[Any] = []
-        self.size = (0, 0)
+        self.size = self.seen = (0, 0)
 
-    def resize(self, width: int, height: int) -> None:
-        """Make the images for width x height pixels, unless they are there."""
-        if self.size == (width, height):
+    def resize(self, size: tuple[int, int], seen: tuple[int, int]) -> None:
+        """Make the images for `size` pixels and a G-buffer of `seen` pixels, unless they are there."""
+        if (self.size, self.seen) == (size, seen):
             return
         limit = int(self._context.info["GL_MAX_TEXTURE_SIZE"]) // self._grid
-        if not (0 < width <= limit and 0 < height <= limit):
-            raise FsidError(f"image size {width} x {height}: this driver draws 1 .. {limit} pixels a side")
+        for width, height in (size, seen):
+            if not (0 < width <= limit and 0 < height <= limit):
+                raise FsidError(
+                    f"image size {width} x {height}: this driver draws 1 .. {limit} pixels a side"
+                )
         self.release()
-        context, large, size = self._context, (width * self._grid, height * self._grid), (width, height)
-        self._a = context.texture(large, 4, dtype="u4")
-        self._b = context.texture(large, 2, dtype="u4")
+        context, large = self._context, (seen[0] * self._grid, seen[1] * self._grid)
+        self.blocks = (-(-seen[0] // 2), -(-seen[1] // 2))
+        self._samples = context.texture(large, 4, dtype="u4")
         self._depth = context.depth_texture(large)
         self._depth.compare_func = ""
-        self._open, self._blurred = (context.texture(size, 2, dtype="f4") for _ in range(2))
-        self._result = [context.texture(size, 4, dtype="f4") for _ in range(3)]
-        images = [self._a, self._b, self._depth, self._open, self._blurred, *self._result]
+        self._block_depth = context.texture(self.blocks, 1, dtype="f4")
+        self._open, self._blurred = (context.texture(self.blocks, 2, dtype="f4") for _ in range(2))
+        self._radiance = context.texture(size, 4, dtype="f4")
+        self._labels = [context.texture(size, 4, dtype="nu2") for _ in range(2)]
+        images = [self._samples, self._depth, self._block_depth, self._open, self._blurred]
+        images += [self._radiance, *self._labels]
         for texture in images:
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        self._to_depth = context.framebuffer([], self._depth)
-        self._to_surfaces = context.framebuffer([self._a, self._b], self._depth)
+        self._to_samples = context.framebuffer([self._samples], self._depth)
+        self._to_block_depth = context.framebuffer([self._block_depth])
         self._to_open = context.framebuffer([self._open])
         self._to_blurred = context.framebuffer([self._blurred])
-        self._to_result = context.framebuffer(self._result)
-        framebuffers = [self._to_depth, self._to_surfaces, self._to_open, self._to_blurred, self._to_result]
+        self._to_result: Any = context.framebuffer([self._radiance, *self._labels])
+        framebuffers = [
+            self._to_samples,
+            self._to_block_depth,
+            self._to_open,
+            self._to_blurred,
+            self._to_result,
+        ]
         self._owned = [*framebuffers, *images]
-        self.size = size
+        self.size, self.seen = size, seen
 
-    def begin_depth(self) -> None:
-        """Draw depth of all samples, from nothing."""
-        self._to_depth.use()
-        self._to_depth.clear(depth=1.0)
+    def begin_samples(self) -> None:
+        """Draw the G-buffer, from nothing."""
+        self._to_samples.use()
+        self._to_samples.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
 
-    def begin_surfaces(self) -> None:
-        """Draw the G-buffer over the depth that is there."""
-        self._to_surfaces.use()
+    def begin_block_depth(self) -> None:
+        """Draw the depth of the blocks; unit 0 holds the G-buffer."""
+        self._samples.use(0)
+        self._to_block_depth.use()
 
     def begin_occlusion(self) -> None:
-        """Draw the occlusion; units 0, 1, 2 hold the G-buffer."""
-        self._a.use(0)
-        self._b.use(1)
-        self._depth.use(2)
+        """Draw the occlusion; units 0, 1 hold the G-buffer and the depth of the blocks."""
+        self._samples.use(0)
+        self._block_depth.use(1)
         self._to_open.use()
 
     def begin_blur(self, *, back: bool) -> None:
@@ -68,25 +82,31 @@ class Targets:
         (self._blurred if back else self._open).use(0)
         (self._to_open if back else self._to_blurred).use()
 
-    def begin_lighting(self) -> None:
-        """Draw the result; units 0, 1, 5, 6 hold the G-buffer and the occlusion."""
-        self._a.use(0)
-        self._b.use(1)
-        self._depth.use(5)
-        self._open.use(6)
+    def begin_shading(self) -> None:
+        """Draw the result; units 8, 9 hold the G-buffer and the occlusion."""
+        self._samples.use(8)
+        self._open.use(9)
         self._to_result.use()
+
+    def mask(self, red: bool, green: bool, blue: bool) -> None:
+        """Let the next draws write some colours only; depth and labels go with green."""
+        self._to_result.color_mask = ((red, green, blue, green), (green,) * 4, (green,) * 4)
+
+    def read_radiance(self) -> np.ndarray:
+        """(H, W, 4): radiance and depth (0: nothing hit), row 0 at the top. A view of what was read."""
+        width, height = self.size
+        return np.frombuffer(self._radiance.read(), np.float32).reshape(height, width, 4)
 
     def read_frame(self) -> Frame:
         """The result, row 0 at the top."""
         width, height = self.size
-        radiance, albedo, normal = (
-            np.frombuffer(t.read(), np.float32).reshape(height, width, 4) for t in self._result
-        )
+        radiance = self.read_radiance()
+        albedo, normal = (np.frombuffer(t.read(), np.uint16).reshape(height, width, 4) for t in self._labels)
         depth = radiance[..., 3]
         return Frame(
             radiance=np.ascontiguousarray(radiance[..., :3]),
-            albedo=np.ascontiguousarray(albedo[..., :3]),
-            normal=np.ascontiguousarray(normal[..., :3]),
+            albedo=albedo[..., :3] * np.float32(1 / _ID_LEVELS),
+            normal=normal[..., :3] * np.float32(2 / _ID_LEVELS) - np.float32(1),
             depth=np.where(depth > 0, depth, np.float32(np.inf)),
             object_id=albedo[..., 3].astype(np.int32) - 1,
         )
@@ -121,7 +141,7 @@ class ShadowAtlas:
         self._depth.repeat_x = self._depth.repeat_y = False
         self._moments = self._context.texture((size[0] // 2, size[1] // 2), 2, dtype="f4")
         self._moments.build_mipmaps()
-        self._moments.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+        self._moments.filter = (moderngl.LINEAR_MIPMAP_NEAREST, moderngl.LINEAR)
         self.framebuffer = self._context.framebuffer([], self._depth)
         self._to_moments = self._context.framebuffer([self._moments])
         self._owned = [self.framebuffer, self._to_moments, self._depth, self._moments]

@@ -1,14 +1,14 @@
 #version 430 core
-// Depth only, for the prepass and the shadow maps: rows of `axes` are right, up, forward.
+// Depth only, for the shadow maps: rows of `axes` are right, up, forward. range_m > 0: parallel light.
 in vec3 in_world;
 uniform vec3 origin;
 uniform mat3 axes;
-uniform vec2 focal;
-uniform vec2 shift;
+uniform float focal;
 uniform float near;
-invariant gl_Position;
+uniform float range_m;
 
 void main() {
     vec3 local = axes * (in_world - origin);
-    gl_Position = vec4(local.xy * focal + shift * local.z, local.z - 2.0 * near, local.z);
+    gl_Position = range_m > 0.0 ? vec4(local.xy * focal, local.z / range_m * 2.0 - 1.0, 1.0)
+                                : vec4(local.xy * focal, local.z - 2.0 * near, local.z);
 }

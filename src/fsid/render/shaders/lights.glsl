@@ -1,92 +1,107 @@
-// Point and spot lights, their shadows, and the GGX reflection of one light. See fsid.render.shadows.
-struct Light {
-    vec4 position;      // xyz; w: radius of the emitting sphere
-    vec4 direction;     // of a spot; w: cosine of the half cone, below -1 for a point light
-    vec4 colour;        // rgb radiant intensity; w: cosine at which a spot reaches full strength
-    vec4 right, up;     // with direction the axes of a light that has one tile; right.w: its focal length
-    ivec4 tiles;        // x: first tile; y: number of tiles, 1 or 6 (the sides +x -x +y -y +z -z)
-};
-layout(std430, binding = 1) readonly buffer Lights { Light lights[]; };
+// Lights and their shadows. See fsid.render.shadows for the tables and fsid.scene.model.Light for the units.
+// Loops have a computed number of turns: llvmpipe runs both sides of every branch, but leaves a loop early.
+layout(binding = 6) uniform sampler2D light_table;
 uniform int light_count;
 layout(binding = 2) uniform sampler2DShadow shadow_compare;
-layout(binding = 3) uniform sampler2D shadow_moments;   // means of 1 / z and 1 / z^2, half the size, with mips
+layout(binding = 3) uniform sampler2D shadow_moments;   // means of u and u^2, half the size, with mips
+layout(binding = 7) uniform sampler2D tap_table;        // row 0: search, row 1: filter; unit disc
 
-const int SEARCH_TAPS = 12;
-const int SHARP_TAPS = 20;
-const int SOFT_TAPS = 20;
-const float BORDER = 0.17;       // of a tile, tangent units: fsid.render.shadows.BORDER
-const float MAX_FILTER = 0.16;
+const int LIGHT_TEXELS = 8;
+const int POINT = 0, SUN = 1, AREA = 2;
 const float SHADOW_NEAR = 0.02;
 const float BIAS_M = 0.0015;
 const float SHARP_TEXELS = 3.0, SOFT_TEXELS = 8.0;   // radius of the penumbra: below, above, blended between
-const float LEAK = 0.08;         // share of light that overlapping occluders let through, cut off
-const int TILE_COLUMNS = 6;
-uniform vec2 search_taps[SEARCH_TAPS];   // Vogel spirals on the unit disc
-uniform vec2 filter_taps[SOFT_TAPS];
+const float LEAK = 0.1;          // share of light that overlapping occluders let through, cut off
+const float STEEPEST = 12.0;     // tangent of the steepest receiver that is followed
+const float DARK = 0.98;         // share of the search that is blocked where nothing more is looked for
+const float PI = 3.14159265;
+uniform int search_taps;
+uniform int filter_taps;
 uniform float tile_px;
+uniform int tile_columns;
 
-struct Field {
-    vec3 q, n;      // position and normal in the tile's axes: right, up, forward
-    float focal;    // in half tiles
-    int tile;
+struct Light {
+    vec3 position;
+    float radius_m;          // of the sphere; of the sun the tangent of its angular radius
+    vec3 direction;
+    float cos_outer, cos_inner;
+    vec3 colour;
+    vec3 right, up;          // with direction the axes of a light that has one tile
+    float focal, border;     // of the tiles: in half tiles; tangent units
+    int kind, first_tile, tile_count;
+    float range_m;           // of the sun's tile
+    vec3 half_width, half_height;   // of an area light
 };
 
-Field field_of(Light light, vec3 d, vec3 n) {
-    if (light.tiles.y == 1) {
-        mat3 axes = transpose(mat3(light.right.xyz, light.up.xyz, light.direction.xyz));
-        return Field(axes * d, axes * n, light.right.w, light.tiles.x);
-    }
-    vec3 a = abs(d);
-    const float focal = 1.0 / (1.0 + BORDER);
-    if (a.x >= a.y && a.x >= a.z) {
-        float side = d.x < 0.0 ? -1.0 : 1.0;
-        return Field(vec3(d.yz, a.x), vec3(n.yz, side * n.x), focal, light.tiles.x + (d.x < 0.0 ? 1 : 0));
-    }
-    if (a.y >= a.z) {
-        float side = d.y < 0.0 ? -1.0 : 1.0;
-        return Field(vec3(d.zx, a.y), vec3(n.zx, side * n.y), focal, light.tiles.x + (d.y < 0.0 ? 3 : 2));
-    }
-    float side = d.z < 0.0 ? -1.0 : 1.0;
-    return Field(vec3(d.xy, a.z), vec3(n.xy, side * n.z), focal, light.tiles.x + (d.z < 0.0 ? 5 : 4));
+Light light_at(int i) {
+    vec4 t[LIGHT_TEXELS];
+    for (int k = 0; k < LIGHT_TEXELS; ++k) t[k] = texelFetch(light_table, ivec2(k, i), 0);
+    return Light(t[0].xyz, t[0].w, t[1].xyz, t[1].w, t[2].w, t[2].rgb, t[3].xyz, t[4].xyz, t[3].w, t[4].w,
+                 int(t[5].x), int(t[5].y), int(t[5].z), t[5].w, t[6].xyz, t[7].xyz);
 }
 
-// Where a receiver is in its tile. 1 / z of the receiver's plane is linear in the tangent coordinates.
+// Where a receiver is in its tile. u = 1 - window depth is near / z (of the sun: 1 - z / range), which is
+// linear over the tile for every plane.
 struct Receiver {
     vec2 corner, centre;   // of the tile and of the receiver, 0..1 of the atlas
-    vec2 to_atlas;         // tangent units to 0..1 of the atlas
-    vec2 slope;            // of 1 / z of the plane
-    float inverse_z;
-    float texel;           // of the depth, tangent units
-    float bias;            // of 1 / z
-    float tile_size;       // tangent units
+    vec2 to_atlas;         // tile units to 0..1 of the atlas
+    vec2 slope;            // of u of the plane, per tile unit
+    float u;
+    float bias;            // of u
+    float texel, tile_size;   // of the depth; tile units
+    mat2 spread;           // how far the light's half axes move a shadow, per difference of u; tile units
+    float search;          // radius of what may shade it, tile units
 };
 
-Receiver receiver_of(Field field) {
-    vec3 q = field.q, n = field.n;
+Receiver receiver_of(Light light, vec3 d, vec3 n) {
+    bool one = light.tile_count == 1;
+    vec3 a = abs(d);
+    int axis = a.x >= a.y && a.x >= a.z ? 0 : a.y >= a.z ? 1 : 2;
+    float side = d[axis] < 0.0 ? -1.0 : 1.0;
+    int e = axis == 2 ? 0 : axis + 1, f = e == 2 ? 0 : e + 1;
+    mat3 axes = transpose(mat3(light.right, light.up, light.direction));
+    mat3 sides = transpose(mat3(vec3(e == 0, e == 1, e == 2), vec3(f == 0, f == 1, f == 2),
+                                side * vec3(axis == 0, axis == 1, axis == 2)));
+    if (!one) axes = sides;
+    vec3 q = axes * d, m = axes * n;
+    int tile = light.first_tile + (one ? 0 : 2 * axis + (side < 0.0 ? 1 : 0));
+    bool sun = light.kind == SUN;
+
     Receiver r;
     vec2 atlas = 2.0 * vec2(textureSize(shadow_moments, 0));
-    r.inverse_z = 1.0 / q.z;
-    r.tile_size = 2.0 / field.focal;
+    vec2 at = sun ? q.xy : q.xy / q.z;
+    float facing = sun ? m.z : dot(m, q);
+    float toward = (facing < 0.0 ? -1.0 : 1.0) / max(abs(facing), 1e-6);
+    r.u = sun ? 1.0 - q.z / light.range_m : SHADOW_NEAR / q.z;
+    r.slope = m.xy * toward * (sun ? 1.0 / light.range_m : SHADOW_NEAR);
+    float steep = sun ? STEEPEST / light.range_m : STEEPEST * r.u;
+    r.slope *= min(1.0, steep / max(length(r.slope), 1e-12));
+    r.bias = sun ? BIAS_M / light.range_m : BIAS_M * r.u * r.u / SHADOW_NEAR;
+    r.tile_size = 2.0 / light.focal;
     r.texel = r.tile_size / tile_px;
     r.to_atlas = tile_px / (atlas * r.tile_size);
-    r.corner = vec2(field.tile % TILE_COLUMNS, field.tile / TILE_COLUMNS) * tile_px / atlas;
-    r.centre = r.corner + r.to_atlas * (0.5 * r.tile_size + q.xy * r.inverse_z);
-    float facing = dot(n, q);
-    r.slope = n.xy / (abs(facing) > 1e-6 ? facing : 1e-6);
-    r.slope *= min(1.0, 12.0 / max(length(r.slope) * q.z, 1e-6));   // steep planes are limited
-    r.bias = BIAS_M * r.inverse_z * r.inverse_z;
+    r.corner = vec2(tile % tile_columns, tile / tile_columns) * tile_px / atlas;
+    r.centre = r.corner + r.to_atlas * (0.5 * r.tile_size + at);
+    float per_u = sun ? light.range_m : 1.0 / SHADOW_NEAR;
+    vec3 w = axes * light.half_width, h = axes * light.half_height;
+    bool area = light.kind == AREA;
+    r.spread = area ? per_u * mat2(w.xy - at * w.z, h.xy - at * h.z) : mat2(per_u * light.radius_m);
+    float size = max(length(r.spread[0]), length(r.spread[1]));
+    float nearest = sun ? 1.0 - r.u : 2.0 * r.u;    // difference of u to the nearest blocker looked for
+    float widest = max(light.border - 0.01, 2.0 * r.texel);
+    r.search = clamp(size * nearest, 2.0 * r.texel, sun ? light.border : widest);
     return r;
 }
 
 // Light that reaches the receiver's plane at `offset` past what the shadow map holds within `width` of there
-// (both tangent units), by Chebyshev's inequality (Donnelly and Lauritzen 2006); exact for one occluder
-// in front of the plane. blocked: summed 1 / z of the occluders (Yang et al. 2010).
+// (both tile units), by Chebyshev's inequality (Donnelly and Lauritzen 2006); exact for one occluder
+// in front of the plane. blocked: summed u of the occluders (Yang et al. 2010).
 float soft_tap(Receiver r, vec2 offset, float width, out float blocked) {
     vec2 inside = r.to_atlas * min(width, 0.5 * r.tile_size);
     vec2 uv = clamp(r.centre + r.to_atlas * offset, r.corner + inside, r.corner + r.to_atlas * r.tile_size - inside);
     float level = log2(max(width / (2.0 * r.texel), 1.0));
     vec2 moments = textureLod(shadow_moments, uv, level).xy;
-    float limit = r.inverse_z + dot(r.slope, (uv - r.centre) / r.to_atlas);
+    float limit = r.u + dot(r.slope, (uv - r.centre) / r.to_atlas);
     float in_front = max(moments.x - limit - r.bias, 0.0);
     float variance = max(moments.y - moments.x * moments.x, 0.0);
     float lit = in_front > 0.0 ? variance / (variance + in_front * in_front) : 1.0;
@@ -94,52 +109,113 @@ float soft_tap(Receiver r, vec2 offset, float width, out float blocked) {
     return lit;
 }
 
-// Percentage-closer filter on the depth itself, where the penumbra is a few texels.
-float sharp_filter(Receiver r, float radius) {
-    float bias = r.bias + (abs(r.slope.x) + abs(r.slope.y)) * r.texel;
-    float lit = 0.0;
-    for (int i = 0; i < SHARP_TAPS; ++i) {
-        vec2 offset = radius * filter_taps[i];
-        float limit = r.inverse_z + dot(r.slope, offset) + bias;
-        lit += textureLod(shadow_compare, vec3(r.centre + r.to_atlas * offset, 1.0 - SHADOW_NEAR * limit), 0.0);
-    }
-    return lit / float(SHARP_TAPS);
+// Is there nothing but the receiver's own plane within `width`? Then no light is lost.
+bool alone(Receiver r, float width) {
+    vec2 inside = r.to_atlas * min(width, 0.5 * r.tile_size);
+    vec2 uv = clamp(r.centre, r.corner + inside, r.corner + r.to_atlas * r.tile_size - inside);
+    vec2 moments = textureLod(shadow_moments, uv, log2(max(width / (2.0 * r.texel), 1.0))).xy;
+    float limit = r.u + dot(r.slope, (uv - r.centre) / r.to_atlas);
+    float variance = moments.y - moments.x * moments.x;
+    float own = dot(r.slope, r.slope) * width * width;
+    return abs(moments.x - limit) < 0.3 * r.bias && variance < own + r.bias * r.bias;
 }
 
-float soft_filter(Receiver r, float radius) {
-    float lit = 0.0, ignored;
-    for (int i = 0; i < SOFT_TAPS; ++i) lit += soft_tap(r, radius * filter_taps[i], 0.3 * radius, ignored);
-    return clamp((lit / float(SOFT_TAPS) - LEAK) / (1.0 - LEAK), 0.0, 1.0);
-}
-
-// Share of the light's sphere seen from `position`: soft shadows by the mean depth of what is in the way
-// (Fernando 2005), with fixed taps that are areas and not points, so that they leave no pattern.
-float visibility(Light light, vec3 position, vec3 face_normal) {
-    Receiver r = receiver_of(field_of(light, position - light.position.xyz, face_normal));
-    float radius = light.position.w;
-    float search = clamp(2.0 * radius * r.inverse_z, 2.0 * r.texel, MAX_FILTER);
-    float shaded = 0.0, blocked_sum = 0.0;
-    for (int i = 0; i < SEARCH_TAPS; ++i) {
-        float blocked;
-        shaded += 1.0 - soft_tap(r, search * search_taps[i], 0.3 * search, blocked);
+// Share of the light seen from `position`: soft shadows by the mean depth of what is in the way
+// (Fernando 2005), with fixed taps that are areas and not points, so that they leave no pattern; where the
+// penumbra is a few texels, a percentage-closer filter on the depth itself. wanted: false asks nothing.
+float visibility(Light light, vec3 position, vec3 face_normal, bool wanted) {
+    Receiver r = receiver_of(light, position - light.position, face_normal);
+    float shaded = 0.0, blocked_sum = 0.0, blocked;
+    int taps = wanted && !alone(r, 1.2 * r.search) ? search_taps : 0;
+    mat2 search = r.spread * (r.search / max(max(length(r.spread[0]), length(r.spread[1])), 1e-12));
+    float width = 0.3 * r.search;
+    for (int i = 0; i < taps; ++i) {
+        vec2 offset = search * texelFetch(tap_table, ivec2(i, 0), 0).xy;
+        shaded += 1.0 - soft_tap(r, offset, width, blocked);
         blocked_sum += blocked;
     }
-    if (shaded < 1e-4) return 1.0;
-    float blocker = blocked_sum / shaded;
-    float spread = clamp(radius * (blocker - r.inverse_z), 0.75 * r.texel, search);
-    float soft = smoothstep(SHARP_TEXELS, SOFT_TEXELS, spread / r.texel);
-    float lit = 0.0;
-    if (soft < 1.0) lit += (1.0 - soft) * sharp_filter(r, spread);
-    if (soft > 0.0) lit += soft * soft_filter(r, spread);
-    return lit;
+    bool dark = shaded > DARK * float(search_taps);
+    bool mixed = shaded >= 1e-4 && !dark;
+    float nearer = max(blocked_sum / max(shaded, 1e-4) - r.u, 0.0);
+    mat2 spread = r.spread * nearer;
+    float size = max(length(spread[0]), length(spread[1]));
+    float wide = clamp(size, 0.75 * r.texel, r.search);
+    spread = size > 1e-12 ? spread * (wide / size) : mat2(wide);
+    float soft = smoothstep(SHARP_TEXELS, SOFT_TEXELS, wide / r.texel);
+
+    float sharp_lit = 0.0, bias = r.bias + (abs(r.slope.x) + abs(r.slope.y)) * r.texel;
+    int sharp = mixed && soft < 1.0 ? filter_taps : 0;
+    for (int i = 0; i < sharp; ++i) {
+        vec2 offset = spread * texelFetch(tap_table, ivec2(i, 1), 0).xy;
+        float limit = r.u + dot(r.slope, offset) + bias;
+        sharp_lit += textureLod(shadow_compare, vec3(r.centre + r.to_atlas * offset, 1.0 - limit), 0.0);
+    }
+    float soft_lit = 0.0;
+    int smooth_taps = mixed && soft > 0.0 ? filter_taps : 0;
+    for (int i = 0; i < smooth_taps; ++i) {
+        vec2 offset = spread * texelFetch(tap_table, ivec2(i, 1), 0).xy;
+        soft_lit += soft_tap(r, offset, 0.3 * wide, blocked);
+    }
+    soft_lit /= float(filter_taps);
+    float dim = 1.0 - soft_lit;
+    soft_lit = max(soft_lit - LEAK * dim * dim * dim, 0.0);
+    float lit = mix(sharp_lit / float(filter_taps), soft_lit, soft);
+    return mixed ? lit : dark ? 0.0 : 1.0;
 }
 
-// Irradiance at normal incidence, without shadow; to_light is unit.
+// Irradiance at normal incidence of a point, spot or sun, without shadow; to_light is unit.
 vec3 arriving(Light light, vec3 to_light, float distance_m) {
-    float reach = max(distance_m, light.position.w);
-    float cone = light.direction.w < -1.0 ? 1.0
-        : smoothstep(light.direction.w, light.colour.w, dot(light.direction.xyz, -to_light));
-    return light.colour.rgb * (cone / (reach * reach));
+    float reach = light.kind == SUN ? 1.0 : max(distance_m, light.radius_m);
+    float cone = light.cos_outer < -1.0 ? 1.0
+        : smoothstep(light.cos_outer, light.cos_inner, dot(light.direction, -to_light));
+    return light.colour * (cone / (reach * reach));
+}
+
+// Integral of cos(theta) / pi over a rectangle above the horizon of n (Lambert 1760, as summed over edges by
+// Baum et al. 1989), seen from `position`.
+vec3 corner_of(Light light, vec3 centre, int i) {
+    float x = i == 1 || i == 2 ? 1.0 : -1.0, y = i == 2 || i == 3 ? 1.0 : -1.0;
+    return centre + x * light.half_width + y * light.half_height;
+}
+
+float form_factor(Light light, vec3 position, vec3 n, int edges) {
+    vec3 centre = light.position - position;
+    vec3 leaves = vec3(0), returns = vec3(0);
+    float sum = 0.0;
+    bool cut = false;
+    for (int i = 0; i < edges; ++i) {
+        bool side = i < 4;     // the last edge closes what the horizon cuts
+        vec3 a = side ? corner_of(light, centre, i) : leaves;
+        vec3 b = side ? corner_of(light, centre, (i + 1) & 3) : returns;
+        float ha = dot(a, n), hb = dot(b, n);
+        vec3 crossing = mix(a, b, clamp(ha / (abs(ha - hb) > 1e-9 ? ha - hb : 1e-9), 0.0, 1.0));
+        bool down = side && ha > 0.0 && hb <= 0.0, up = side && ha <= 0.0 && hb > 0.0;
+        leaves = down ? crossing : leaves;
+        returns = up ? crossing : returns;
+        cut = cut || down;
+        vec3 p = normalize(up ? crossing : a), q = normalize(down ? crossing : b);
+        vec3 across = cross(p, q);
+        float s = length(across);
+        bool counts = side ? max(ha, hb) > 0.0 : cut;
+        sum += counts && s > 1e-7 ? dot(across, n) * (atan(s, dot(p, q)) / s) : 0.0;
+    }
+    return abs(sum) * (0.5 / PI);
+}
+
+// Share of a lobe of tangent width `wide` around ray r that meets the rectangle (a Gaussian lobe, whose
+// integral over a rectangle is a product of error functions).
+float mirror_form(Light light, vec3 position, vec3 r, float wide) {
+    vec3 c = light.position - position;
+    float ahead = -dot(r, light.direction);
+    float t = dot(c, light.direction) / min(-ahead, -1e-3);
+    vec3 hit = r * t - c;
+    vec2 half_size = vec2(length(light.half_width), length(light.half_height));
+    vec2 at = vec2(dot(hit, light.half_width), dot(hit, light.half_height)) / (half_size * half_size);
+    vec2 sigma = vec2(max(wide * max(t, 0.0), 1e-4)) / half_size;
+    vec2 low = (-1.0 - at) / sigma, high = (1.0 - at) / sigma;
+    vec2 share = 0.5 * (tanh(clamp(1.5957691 * (high + 0.044715 * high * high * high) * 0.5, -15.0, 15.0))
+                      - tanh(clamp(1.5957691 * (low + 0.044715 * low * low * low) * 0.5, -15.0, 15.0)));
+    return ahead > 0.0 && t > 0.0 ? share.x * share.y : 0.0;
 }
 
 // GGX with height-correlated Smith masking (Heitz 2014) and Schlick's Fresnel: f * cos at the light.
@@ -148,8 +224,9 @@ vec3 reflected(vec3 f0, float alpha, vec3 n, vec3 v, vec3 l) {
     float nl = max(dot(n, l), 0.0), nv = max(abs(dot(n, v)), 1e-3), nh = max(dot(n, h), 0.0);
     float a2 = alpha * alpha;
     float t = nh * nh * (a2 - 1.0) + 1.0;
-    float d = a2 / (3.14159265 * t * t);
+    float d = a2 / (PI * t * t);
     float g = nl * sqrt(nv * nv * (1.0 - a2) + a2) + nv * sqrt(nl * nl * (1.0 - a2) + a2);
-    vec3 f = f0 + (1.0 - f0) * pow(1.0 - clamp(dot(v, h), 0.0, 1.0), 5.0);
+    float s = clamp(1.0 - dot(v, h), 0.0, 1.0), s2 = s * s;
+    vec3 f = f0 + (1.0 - f0) * (s2 * s2 * s);
     return f * (d * 0.5 * nl / max(g, 1e-4));
 }

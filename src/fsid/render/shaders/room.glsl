@@ -1,28 +1,29 @@
-// The room as a light source: see fsid.render.room. Sides in the order +x -x +y -y +z -z.
+// The surroundings as a light source: see fsid.render.room. Sides in the order +x -x +y -y +z -z.
 layout(binding = 4) uniform sampler2DArray room_radiance;
 uniform vec3 ambient_sides[6];   // ambient radiance that arrives from each side
 uniform vec3 mean_sides[6];      // mean of room_radiance over each side
-uniform vec3 room_half;          // half size of the room
-const float ROOM_TEXELS = 16.0;  // per side
-const float ROOM_LEVELS = 4.0;
+uniform vec3 room_half;          // half size of the room; under the sky so large that places do not matter
+uniform vec3 room_centre;
 
 // A value per side as a smooth function of direction: the ambient cube (McTaggart 2004), weights sum to one.
 vec3 cube(vec3 sides[6], vec3 n) {
     vec3 w = n * n;
-    return w.x * sides[n.x < 0.0 ? 1 : 0] + w.y * sides[n.y < 0.0 ? 3 : 2] + w.z * sides[n.z < 0.0 ? 5 : 4];
+    return w.x * (n.x < 0.0 ? sides[1] : sides[0]) + w.y * (n.y < 0.0 ? sides[3] : sides[2])
+         + w.z * (n.z < 0.0 ? sides[5] : sides[4]);
 }
 
 // What a mirror of roughness alpha at `position` sees in direction r: the wall where the ray meets it, and
 // the rougher it is the more of whole walls, which blend where the room has edges.
 vec3 mirrored(vec3 position, vec3 r, float alpha) {
-    vec3 p = clamp(position - vec3(0, 0, room_half.z), -room_half, room_half);
+    vec3 p = clamp(position - room_centre, -room_half, room_half);
     vec3 ray = mix(r, vec3(1e-6), lessThan(abs(r), vec3(1e-6)));
     vec3 t = (sign(ray) * room_half - p) / ray;
     int axis = t.x <= t.y && t.x <= t.z ? 0 : t.y <= t.z ? 1 : 2;
     vec3 at = 0.5 + 0.5 * (p + ray * t[axis]) / room_half;
     vec2 uv = vec2(at[(axis + 1) % 3], at[(axis + 2) % 3]);
-    float width = 2.0 * min(room_half.x, min(room_half.y, room_half.z)) / ROOM_TEXELS;
-    float level = min(log2(1.0 + 2.0 * alpha * t[axis] / width), ROOM_LEVELS);
+    float texels = float(textureSize(room_radiance, 0).x);
+    float width = 2.0 * min(room_half.x, min(room_half.y, room_half.z)) / texels;
+    float level = min(log2(1.0 + 2.0 * alpha * t[axis] / width), log2(texels));
     vec3 wall = textureLod(room_radiance, vec3(uv, 2 * axis + (ray[axis] < 0.0 ? 1 : 0)), level).rgb;
     return mix(wall, cube(mean_sides, r), smoothstep(0.0, 0.4, alpha));
 }

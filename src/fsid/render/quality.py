@@ -1,0 +1,51 @@
+"""How much work goes into a frame: numbers of taps and sizes of shadow maps.
+
+All taps lie on sunflower spirals (Vogel 1979), the same for every pixel: no dither, no noise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Quality:
+    """search_taps, filter_taps: per shadow. occlusion_taps: per block. probes: per texture footprint.
+
+    shadow_px: edge of a shadow map's tile, texels.
+    """
+
+    search_taps: int
+    filter_taps: int
+    occlusion_taps: int
+    probes: float
+    shadow_px: int
+
+
+QUALITIES = {
+    "high": Quality(search_taps=8, filter_taps=16, occlusion_taps=32, probes=4.0, shadow_px=1024),
+    "fast": Quality(search_taps=6, filter_taps=9, occlusion_taps=14, probes=2.0, shadow_px=512),
+}
+
+
+def tap_table(quality: Quality) -> np.ndarray:
+    """(3, N, 2) float32 points of the unit disc: search, filter, occlusion; the rest of a row is unused."""
+    rows = (
+        spiral(quality.search_taps),
+        spiral(quality.filter_taps),
+        spiral(quality.occlusion_taps, 1.0),
+    )
+    table = np.zeros((3, max(len(row) for row in rows), 2), np.float32)
+    for target, row in zip(table, rows, strict=True):
+        target[: len(row)] = row
+    return table
+
+
+def spiral(count: int, growth: float = 0.5) -> np.ndarray:
+    """(count, 2) points of a sunflower spiral on the unit disc, centred; radius ~ index^growth."""
+    i = np.arange(count)
+    radius, angle = ((i + 0.5) / count) ** growth, i * np.pi * (3 - np.sqrt(5))
+    points = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
+    return np.asarray(points - points.mean(0))

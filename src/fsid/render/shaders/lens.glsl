@@ -1,0 +1,56 @@
+// Pixels of the image -> rays -> samples of the G-buffer, which is a pinhole image.
+// LENS: 0 pinhole, 1 Brown-Conrady, 2 fisheye.
+uniform int grid;
+uniform ivec2 size;        // of the image, pixels
+uniform ivec2 seen;        // of the G-buffer, pixels
+uniform vec2 focal;        // of the image's camera, half image sizes
+uniform vec2 seen_focal;   // of the G-buffer's
+uniform vec2 seen_shift;   // of the G-buffer, half image sizes
+uniform vec2 shift;        // of the image, pixels
+uniform vec2 lens_offset;  // of the rays (x, y): place on the lens / distance of the sharp plane
+uniform float magnification;   // of this colour
+uniform float k[5];
+
+// Normalised coordinates (x right, y down) whose distorted image is at `d`: Newton's method.
+#if LENS == 0
+vec2 undistorted(vec2 d) { return d; }
+#elif LENS == 1
+vec2 undistorted(vec2 d) {
+    vec2 p = d;
+    for (int i = 0; i < 12; ++i) {
+        float x = p.x, y = p.y, r2 = dot(p, p);
+        float radial = 1.0 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]));
+        float growth = 2.0 * (k[0] + r2 * (2.0 * k[1] + r2 * 3.0 * k[4]));
+        vec2 f = p * radial + vec2(2.0 * k[2] * x * y + k[3] * (r2 + 2.0 * x * x),
+                                   k[2] * (r2 + 2.0 * y * y) + 2.0 * k[3] * x * y) - d;
+        float a = radial + growth * x * x + 2.0 * k[2] * y + 6.0 * k[3] * x;
+        float b = growth * x * y + 2.0 * k[2] * x + 2.0 * k[3] * y;
+        float e = radial + growth * y * y + 6.0 * k[2] * y + 2.0 * k[3] * x;
+        p -= vec2(e * f.x - b * f.y, a * f.y - b * f.x) / (a * e - b * b);
+    }
+    return p;
+}
+#else
+vec2 undistorted(vec2 d) {
+    float wanted = length(d), theta = min(wanted, 1.4);
+    for (int i = 0; i < 12; ++i) {
+        float t2 = theta * theta;
+        float value = theta * (1.0 + t2 * (k[0] + t2 * (k[1] + t2 * (k[2] + t2 * k[3]))));
+        float growth = 1.0 + t2 * (3.0 * k[0] + t2 * (5.0 * k[1] + t2 * (7.0 * k[2] + t2 * 9.0 * k[3])));
+        theta -= (value - wanted) / growth;
+    }
+    return d * (wanted > 1e-9 ? tan(theta) / wanted : 1.0);
+}
+#endif
+
+// The ray through a point of the image (pixels): x right, y up, and 1 along the viewing axis.
+vec3 ray_at(vec2 pixel) {
+    vec2 ndc = ((pixel - shift) / vec2(size) * 2.0 - 1.0) / magnification;
+    vec2 p = undistorted(ndc / focal);
+    return vec3(vec2(p.x, -p.y) - lens_offset, 1.0);
+}
+
+// Where the G-buffer sees a ray, in its pixels.
+vec2 seen_at(vec3 ray) {
+    return ((vec2(ray.x, -ray.y) * seen_focal + seen_shift) * 0.5 + 0.5) * vec2(seen);
+}

@@ -1,0 +1,85 @@
+// Material evaluation: box mapping in metres, blended where the surface turns from one axis to the next.
+// Loops have a computed number of turns: llvmpipe runs both sides of every branch, but leaves a loop early.
+layout(binding = 0) uniform sampler2DArray masks;    // mix, pattern, detail, roughness
+layout(binding = 1) uniform sampler2DArray relief;   // slope u, slope v, spread, metallic
+uniform float max_probes;
+
+const float BLEND = 0.2;          // axes whose component is this close to the largest one are blended
+const float MIN_ROUGHNESS = 0.18; // bounds the highlight: alpha >= 0.032
+const float SLOPE_LEVELS = 127.0;
+const float DETAIL = 2.0 * 255.0 / 254.0;  // neutral detail is stored exactly
+const float SHARPEN = 0.75;       // of the footprint: a trilinear probe is wider than a pixel
+
+struct Matter {
+    vec3 albedo;
+    vec3 normal;      // world, with relief
+    float alpha2;     // GGX
+    float metallic;
+};
+
+// Directions in which the texture's u and v grow on the faces of a box; v grows downwards.
+void face_axes(int axis, float side, out vec3 u, out vec3 v) {
+    u = axis == 0 ? vec3(0, side, 0) : axis == 1 ? vec3(-side, 0, 0) : vec3(1, 0, 0);
+    v = axis == 2 ? vec3(0, -side, 0) : vec3(0, 0, -1);
+}
+
+vec3 into(vec3 rows[3], vec3 world) { return world.x * rows[0] + world.y * rows[1] + world.z * rows[2]; }
+vec3 out_of(vec3 rows[3], vec3 v) { return vec3(dot(rows[0], v), dot(rows[1], v), dot(rows[2], v)); }
+
+// position, normal: world. dx, dy: from this pixel's position to those of its neighbours.
+Matter matter_at(Surface s, vec3 position, vec3 normal, vec3 dx, vec3 dy) {
+    vec3 n = into(s.place, normal);
+    vec3 metric = into(s.place, position - s.position);
+    vec3 mx = into(s.place, dx), my = into(s.place, dy);
+    vec3 size = abs(n);
+    vec3 weight = max(size - (max(size.x, max(size.y, size.z)) - BLEND), 0.0);
+    weight *= weight;
+    weight /= weight.x + weight.y + weight.z;
+    uint left = uint(weight.x > 1e-3) | (uint(weight.y > 1e-3) << 1) | (uint(weight.z > 1e-3) << 2);
+    vec4 mask = vec4(0), other = vec4(0);
+    vec3 gradient = vec3(0);
+    float total = 0.0, texels = float(textureSize(masks, 0).x);
+    while (left != 0u) {
+        int axis = findLSB(left);
+        left &= left - 1u;
+        vec3 u, v;
+        face_axes(axis, n[axis] < 0.0 ? -1.0 : 1.0, u, v);
+        vec3 tu = s.turn.x * u + s.turn.y * v;
+        vec3 tv = s.turn.x * v - s.turn.y * u;
+        vec2 uv = vec2(dot(tu, metric), dot(tv, metric)) * s.tiles_per_m + vec2(0.37, 0.61) * float(axis);
+        vec2 gx = vec2(dot(tu, mx), dot(tv, mx)) * s.tiles_per_m;
+        vec2 gy = vec2(dot(tu, my), dot(tv, my)) * s.tiles_per_m;
+        // Long footprints are covered by several probes along their length: written out, because drivers
+        // differ in their anisotropic filter (and some take seconds for one frame of it).
+        float lx = dot(gx, gx), ly = dot(gy, gy);
+        vec2 along = lx > ly ? gx : gy;
+        float longest = SHARPEN * sqrt(max(lx, ly)), across = max(SHARPEN * sqrt(min(lx, ly)), 1e-8);
+        int probes = int(clamp(ceil(longest / across - 0.25), 1.0, max_probes));
+        float level = log2(max(longest / float(probes), across) * texels);
+        vec4 m = vec4(0), r = vec4(0);
+        for (int k = 0; k < probes; ++k) {
+            vec3 probe = vec3(uv + along * ((float(k) + 0.5) / float(probes) - 0.5), s.layer);
+            m += textureLod(masks, probe, level);
+            r += textureLod(relief, probe, level);
+        }
+        m /= float(probes);
+        r /= float(probes);
+        vec2 slope = (r.xy * 255.0 - 128.0) / SLOPE_LEVELS * s.slope_scale;
+        mask += weight[axis] * m;
+        other += weight[axis] * r;
+        gradient += weight[axis] * (slope.x * tu + slope.y * tv);
+        total += weight[axis];
+    }
+    mask /= total;
+    other /= total;
+    gradient /= total;
+    float roughness = clamp(mask.a * s.roughness_scale, MIN_ROUGHNESS, 1.0);
+    float spread = other.b * s.slope_scale;
+    vec3 base = mix(mix(s.colour_a, s.colour_b, mask.r), s.colour_c, mask.g);
+    Matter matter;
+    matter.albedo = clamp(base * (mask.b * DETAIL), 0.0, 1.0);
+    matter.normal = out_of(s.place, normalize(n - (gradient - n * dot(n, gradient))));
+    matter.alpha2 = roughness * roughness * roughness * roughness + 2.0 * spread * spread;
+    matter.metallic = other.a;
+    return matter;
+}

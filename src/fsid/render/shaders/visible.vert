@@ -1,0 +1,23 @@
+#version 430 core
+// What is seen: every vertex with its surface, for visible.frag. rows of `axes` are right, up, forward.
+in vec3 in_world;
+in vec3 in_normal;
+in uint in_surface;
+uniform vec3 origin;
+uniform mat3 axes;
+uniform vec2 focal;
+uniform vec2 shift;
+uniform float near;
+out vec3 from_camera;     // world axes
+out vec3 normal;
+out float distance_m;     // along the viewing axis
+flat out uint surface;
+
+void main() {
+    from_camera = in_world - origin;
+    vec3 local = axes * from_camera;
+    distance_m = local.z;
+    normal = in_normal;
+    surface = in_surface;
+    gl_Position = vec4(local.xy * focal + shift * local.z, local.z - 2.0 * near, local.z);
+}

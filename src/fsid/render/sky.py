@@ -1,0 +1,155 @@
+"""The sky by direction: an equirectangular panorama, row 0 = zenith, column 0 = +x, turning towards +y.
+
+    clear sky    colour * mix(zenith, horizon, (1 - sin elevation)^4)      below the horizon: ground glow
+    clouds       white, where fractal value noise exceeds a level set by `cloudiness`
+
+scaled so that the mean radiance of the upper half (by solid angle) is `Sky.colour`. A picture file is used as
+it is, scaled likewise.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from fsid.errors import FsidError
+from fsid.scene.model import Sky
+
+HEIGHT = 512
+_ZENITH = np.array([0.55, 0.85, 1.6])
+_HORIZON = np.array([1.3, 1.25, 1.1])
+_GROUND = 0.25
+
+
+def panorama(sky: Sky) -> np.ndarray:
+    """(H, 2 H, 3) float32 radiance. Raises FsidError for a source that cannot be read."""
+    if sky.source == "procedural":
+        picture = _procedural(sky)
+    elif sky.source.startswith("file:"):
+        picture = _read(Path(sky.source.removeprefix("file:")))
+    else:
+        raise FsidError(f"scene.sky.source '{sky.source}': use 'procedural' or 'file:PATH'")
+    elevation, _ = angles(len(picture))
+    weight = np.cos(elevation) * (elevation > 0)
+    mean = (picture * weight[:, None, None]).sum((0, 1)) / (weight.sum() * picture.shape[1])
+    if sky.source != "procedural":
+        mean = np.full(3, max(float(mean @ (0.2126, 0.7152, 0.0722)), 1e-12))
+    turned = np.roll(picture, round(sky.azimuth_deg / 360 * picture.shape[1]), axis=1)
+    return (turned * (np.array(sky.colour) / np.maximum(mean, 1e-12))).astype(np.float32)
+
+
+def angles(height: int) -> tuple[np.ndarray, np.ndarray]:
+    """Elevation (H,) and azimuth (2 H,) of the texels' centres, radians."""
+    elevation = np.pi / 2 - (np.arange(height) + 0.5) / height * np.pi
+    return elevation, (np.arange(2 * height) + 0.5) / height * np.pi
+
+
+def _procedural(sky: Sky) -> np.ndarray:
+    elevation, azimuth = angles(HEIGHT)
+    height = np.sin(elevation)[:, None, None]
+    low = (1 - np.clip(height, 0, 1)) ** 4
+    picture = _ZENITH * (1 - low) + _HORIZON * low
+    picture = np.where(height < 0, _HORIZON * _GROUND, picture)
+    if sky.cloudiness > 0:
+        cover = _clouds(np.random.default_rng(sky.seed), elevation, azimuth, sky.cloudiness)
+        picture = picture * (1 - cover[..., None]) + 1.6 * cover[..., None]
+    return np.broadcast_to(picture, (HEIGHT, 2 * HEIGHT, 3))
+
+
+def _clouds(
+    rng: np.random.Generator, elevation: np.ndarray, azimuth: np.ndarray, cloudiness: float
+) -> np.ndarray:
+    """(H, W) opacity 0..1 of a flat layer of clouds that thins out towards the horizon."""
+    lattice = rng.random((64, 64))
+    reach = 1.0 / np.tan(np.maximum(elevation, 0.06))[:, None]
+    x, y = reach * np.cos(azimuth), reach * np.sin(azimuth)
+    noise = sum(0.5**octave * _lattice(lattice, x * 2**octave, y * 2**octave) for octave in range(6)) / 1.97
+    level = 0.72 - 0.45 * cloudiness
+    cover = np.clip((noise - level) / 0.18, 0.0, 1.0)
+    return np.asarray(cover * cover * (3 - 2 * cover) * np.clip(elevation / 0.15, 0, 1)[:, None])
+
+
+def _lattice(values: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Smooth interpolation of a periodic lattice of random numbers."""
+    size = len(values)
+    i, j = np.floor(x).astype(int), np.floor(y).astype(int)
+    u, v = x - i, y - j
+    u, v = u * u * (3 - 2 * u), v * v * (3 - 2 * v)
+    a, b = values[j % size, i % size], values[j % size, (i + 1) % size]
+    c, d = values[(j + 1) % size, i % size], values[(j + 1) % size, (i + 1) % size]
+    return np.asarray((a * (1 - u) + b * u) * (1 - v) + (c * (1 - u) + d * u) * v)
+
+
+def _read(path: Path) -> np.ndarray:
+    if path.suffix.lower() == ".exr":
+        return _read_exr(path)
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise FsidError(f"{path}: cannot be read ({error.strerror})") from None
+    return _equirectangular(_radiance_hdr(data, path), path)
+
+
+def _read_exr(path: Path) -> np.ndarray:
+    import OpenEXR
+
+    try:
+        with OpenEXR.File(str(path)) as file:
+            channels = file.channels()
+            pixels = channels["RGB"].pixels if "RGB" in channels else channels["RGBA"].pixels[..., :3]
+    except (OSError, RuntimeError, KeyError, ValueError) as error:
+        raise FsidError(f"{path}: is no OpenEXR picture with R, G and B ({error})") from None
+    return _equirectangular(np.asarray(pixels, np.float32), path)
+
+
+def _equirectangular(picture: np.ndarray, path: Path) -> np.ndarray:
+    height, width = picture.shape[:2]
+    if width != 2 * height or height < 16:
+        raise FsidError(f"{path}: {width} x {height} is no equirectangular picture (twice as wide as high)")
+    if not np.isfinite(picture).all() or picture.min() < 0:
+        raise FsidError(f"{path}: has negative values or values that are not numbers")
+    return picture
+
+
+def _radiance_hdr(data: bytes, path: Path) -> np.ndarray:
+    """(H, W, 3) float32 of a Radiance RGBE file, run-length coded or flat (Ward 1991)."""
+    broken = FsidError(f"{path}: is no complete Radiance .hdr picture with rows from the top (-Y .. +X ..)")
+    header, _, rest = data.partition(b"\n\n")
+    size_line, _, body = rest.partition(b"\n")
+    words = size_line.split()
+    if not header.startswith(b"#?") or len(words) != 4 or words[0] != b"-Y" or words[2] != b"+X":
+        raise broken
+    try:
+        height, width = int(words[1]), int(words[3])
+    except ValueError:
+        raise broken from None
+    if not (0 < height <= 16384 and 0 < width <= 32768):
+        raise broken
+    flat = np.frombuffer(body, np.uint8)
+    if len(flat) == 4 * height * width and not (flat[0] == 2 and flat[1] == 2):
+        rgbe = flat.reshape(height, width, 4)
+    else:
+        rgbe = np.empty((height, width, 4), np.uint8)
+        at = 0
+        for row in rgbe:
+            if bytes(body[at : at + 4]) != bytes((2, 2, width >> 8, width & 255)):
+                raise broken
+            at += 4
+            for channel in range(4):
+                x = 0
+                while x < width:
+                    if at + 1 >= len(body):
+                        raise broken
+                    count = body[at]
+                    if count > 128:
+                        row[x : x + count - 128, channel] = body[at + 1]
+                        x, at = x + count - 128, at + 2
+                    else:
+                        run = flat[at + 1 : at + 1 + count]
+                        if count == 0 or x + len(run) > width or len(run) < count:
+                            raise broken
+                        row[x : x + count, channel] = run
+                        x, at = x + count, at + 1 + count
+    scale = np.ldexp(1.0, rgbe[..., 3].astype(int) - 136)
+    return (rgbe[..., :3] * (scale * (rgbe[..., 3] > 0))[..., None]).astype(np.float32)
