@@ -1,60 +1,116 @@
-"""fsid generate: clean and noisy RAW pairs from random scenes or photographs."""
+"""fsid generate: clean and noisy RAW pairs from random scenes or pictures."""
 
 from __future__ import annotations
 
 import os
+import shutil
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from rich.console import Console
 from tyro.conf import Positional
 
 from fsid.cli.progress import progress_bar
-from fsid.config import load_settings
+from fsid.errors import FsidError
+
+if TYPE_CHECKING:
+    from fsid.dataset import Estimate
 
 Variant = Literal["objects", "materials", "objects-materials", "full"]
+Task = Literal["denoise", "super-resolution"]
 
 
 def generate(
     out: Positional[Path],
     *,
-    count: int,
+    count: int | None = None,
     seed: int = 0,
     config: Path | None = None,
     set: tuple[str, ...] = (),
     width: int | None = None,
     height: int | None = None,
     variant: Variant | None = None,
+    task: Task | None = None,
     images: Path | None = None,
     workers: int = 1,
+    ray: str = "",
+    workers_per_gpu: int = 0,
+    only: str = "",
+    dry_run: bool = False,
     quiet: bool = False,
 ) -> None:
     """Make clean and noisy RAW pairs. Running the same command again continues it.
 
     Writes OUT/config.yaml and OUT/shard-00000.tar ... (WebDataset layout); per sample KEY.clean.dng,
-    KEY.noisy.dng, KEY.rgb.png (sRGB preview) and KEY.json (scene, camera, ISO, k, sigma2, seeds).
+    KEY.noisy.dng, KEY.rgb.png (sRGB preview) and KEY.json (scene, camera, ISO, k, sigma2, seeds, settings).
 
     Args:
         out: Folder of the dataset.
         count: Number of pairs in the finished dataset.
         seed: Seed of the dataset; pair i depends on settings, seed and i alone.
-        config: YAML file of settings (see OUT/config.yaml of any dataset for all of them).
-        set: Single settings, for example --set iso_range=[800,3200] scene.objects_max=30.
+        config: YAML file of settings, or the name of a built-in one (fsid-175k: the paper's dataset).
+        set: Single settings, for example --set iso_range=[800,3200] scene.objects=[20,30] crops=4.
         width: Width of a frame in pixels (default 1920).
         height: Height of a frame in pixels (default 1080).
         variant: What varies between scenes: objects, materials, both, or everything (default full).
-        images: Folder of photographs to make the pairs from instead of scenes; frames are random
-            windows of at most WIDTH x HEIGHT pixels.
-        workers: Number of processes; the result does not depend on it.
+        images: Folder of photographs, or of linear .exr renders of any engine, to take instead
+            of scenes; frames are random windows of at most WIDTH x HEIGHT pixels.
+            of scenes; frames are random windows of at most WIDTH x HEIGHT pixels.
+        workers: Number of processes (of the whole cluster with --ray); the result does not depend on it.
+        ray: Address of a Ray cluster to work on: auto, ray://HOST:10001, or local to start one here.
+        workers_per_gpu: How many workers share a GPU: worker w renders on GPU w // N, on a cluster on the one
+            that Ray assigns. 0: every worker takes the first there is.
+        only: Key of one sample (00000012), or the path of its KEY.json: make that one alone, as loose
+            files in OUT.
+        dry_run: Measure a few pairs, print the estimated time, size and number of shards, and write nothing.
         quiet: No progress bar.
     """
-    from fsid.dataset import GenerateConfig
+    from fsid.dataset import Workforce, estimate, generate_config, make_only
     from fsid.dataset import generate as generate_dataset
 
-    given = {"width": width, "height": height, "variant": variant, "images": images and os.fspath(images)}
-    overrides = [f"{key}={value}" for key, value in given.items() if value is not None]
-    settings = load_settings(GenerateConfig, config, [*set, *overrides])
+    given = {
+        "width": width,
+        "height": height,
+        "variant": variant,
+        "task": task,
+        "images": images and os.fspath(images),
+    }
+    overrides = [*set, *(f"{key}={value}" for key, value in given.items() if value is not None)]
+    console = Console(stderr=True, quiet=quiet)
+    if only:
+        settings = generate_config(config, overrides) if config or overrides else None
+        for path in make_only(out, only, settings, seed):
+            console.print(str(path), soft_wrap=True)
+        return
+    if count is None or count < 1:
+        raise FsidError("--count: say how many pairs the dataset is to have, at least 1")
+    settings, workforce = generate_config(config, overrides), Workforce(workers, ray, workers_per_gpu)
+    if dry_run:
+        costs = estimate(settings, count=count, seed=seed, workforce=workforce)
+        Console().print(_plan(out, costs, workers), soft_wrap=True)
+        return
     with progress_bar("pairs", "pairs", quiet=quiet) as progress:
-        made = generate_dataset(out, settings, count=count, seed=seed, workers=workers, progress=progress)
-    if not quiet:
-        Console(stderr=True).print(f"{out}: {count} pairs, {made} of them new")
+        made = generate_dataset(
+            out,
+            settings,
+            count=count,
+            seed=seed,
+            workforce=workforce,
+            progress=progress,
+            lost=progress.failed,
+        )
+    console.print(f"{out}: {count} pairs, {made} of them new")
+
+
+def _plan(out: Path, costs: Estimate, workers: int) -> str:
+    hours, minutes = divmod(round(costs.seconds / 60), 60)
+    folder = next(path for path in (out, *out.absolute().parents) if path.exists())
+    free = shutil.disk_usage(folder).free
+    return (
+        f"{out}: {costs.pairs} pairs in {costs.shards} shards\n"
+        f"time   {hours} h {minutes:02d} min with {workers} workers "
+        f"({costs.seconds / costs.pairs:.3g} s per pair)\n"
+        f"size   {costs.bytes / 1e9:.3g} GB ({costs.bytes / costs.pairs / 1e6:.3g} MB per pair), "
+        f"{free / 1e9:.3g} GB are free\n"
+        f"An estimate from {costs.measured_pairs} pairs measured here; nothing was written."
+    )

@@ -8,7 +8,6 @@ from tyro.conf import Positional
 
 from fsid.cli.generate import Variant
 from fsid.cli.progress import progress_bar
-from fsid.config import load_settings
 
 
 def preview(
@@ -29,17 +28,17 @@ def preview(
         output: PNG file to write.
         count: Number of scenes.
         seed: Seed of the dataset.
-        config: YAML file of settings, as for fsid generate.
+        config: YAML file of settings or the name of a built-in one, as for fsid generate.
         set: Single settings, key=value.
         width: Width of one scene in pixels.
         height: Height of one scene in pixels.
         variant: What varies between scenes.
         quiet: No progress bar.
     """
-    from fsid.dataset import GenerateConfig, check_png, contact_sheet, save_png
+    from fsid.dataset import check_png, contact_sheet, generate_config, save_png
 
     check_png(output)
     overrides = [*set, f"width={width}", f"height={height}", f"variant={variant}"]
-    settings = load_settings(GenerateConfig, config, overrides)
+    settings = generate_config(config, overrides)
     with progress_bar("scenes", "scenes", quiet=quiet) as progress:
         save_png(output, contact_sheet(settings, seed, count, progress=progress))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 from rich.console import Console
@@ -12,6 +12,7 @@ from rich.progress import (
     Progress,
     ProgressColumn,
     Task,
+    TaskID,
     TextColumn,
     TimeRemainingColumn,
 )
@@ -28,8 +29,25 @@ class _Rate(ProgressColumn):
         return Text(f"{speed:.2f} {self._unit}/s" if speed else "", style="dim")
 
 
+class Bar:
+    """`bar(done, total)` moves it, and shows it at the first call; `bar.failed(line)` counts a failure."""
+
+    def __init__(self, bar: Progress, task: TaskID) -> None:
+        self._bar, self._task, self._failures = bar, task, 0
+
+    def __call__(self, done: int, total: int) -> None:
+        self._bar.start()
+        self._bar.update(self._task, completed=done, total=total)
+
+    def failed(self, line: str) -> None:
+        """Something failed that will be tried again."""
+        self._failures += 1
+        self._bar.console.print(line, style="yellow", soft_wrap=True)
+        self._bar.update(self._task, failures=f"{self._failures} failures")
+
+
 @contextmanager
-def progress_bar(label: str, unit: str, *, quiet: bool) -> Iterator[Callable[[int, int], None]]:
+def progress_bar(label: str, unit: str, *, quiet: bool) -> Iterator[Bar]:
     """Yields progress(done, total), both in `unit`s, for a `with` block; the bar appears at the first."""
     columns = (
         TextColumn("{task.description}"),
@@ -37,15 +55,11 @@ def progress_bar(label: str, unit: str, *, quiet: bool) -> Iterator[Callable[[in
         MofNCompleteColumn(),
         _Rate(unit),
         TimeRemainingColumn(),
+        TextColumn("[yellow]{task.fields[failures]}"),
     )
     bar = Progress(*columns, console=Console(stderr=True, quiet=quiet))
-    task = bar.add_task(label, total=None)
-
-    def progress(done: int, total: int) -> None:
-        bar.start()
-        bar.update(task, completed=done, total=total)
-
+    task = bar.add_task(label, total=None, failures="")
     try:
-        yield progress
+        yield Bar(bar, task)
     finally:
         bar.stop()

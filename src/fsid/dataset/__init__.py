@@ -2,7 +2,9 @@
 
 from fsid.dataset.attempt import Sample, sample_key
 from fsid.dataset.config import GenerateConfig, generate_config
+from fsid.dataset.estimate import Estimate, estimate
 from fsid.dataset.generate import DatasetConfig, Workforce, generate
+from fsid.dataset.only import make_only
 from fsid.dataset.photos import find_photos, read_photo
 from fsid.dataset.picture import check_png, contact_sheet, grid, save_png
 from fsid.dataset.sample import encode, make_frame, make_sample, remake, scene_of, to_uint8
@@ -10,18 +12,21 @@ from fsid.dataset.shards import find_shards, read_member, shard_keys, shard_path
 
 __all__ = [
     "DatasetConfig",
+    "Estimate",
     "GenerateConfig",
     "Sample",
     "Workforce",
     "check_png",
     "contact_sheet",
     "encode",
+    "estimate",
     "find_photos",
     "find_shards",
     "generate",
     "generate_config",
     "grid",
     "make_frame",
+    "make_only",
     "make_sample",
     "read_member",
     "read_photo",

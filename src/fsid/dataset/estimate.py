@@ -1,0 +1,70 @@
+"""What a dataset will cost, from a short sample that is measured on the spot.
+
+    time = pairs left * seconds of a frame / pairs per frame / workers        seconds: all workers at once
+
+Every worker makes a frame to warm up (programs compiled, first materials baked) and then `FRAMES` frames that
+count, while the others do the same, so what they take from each other is in the figure.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+from fsid.dataset.config import GenerateConfig
+from fsid.dataset.crew import run
+from fsid.dataset.generate import Workforce, dataset_config
+from fsid.dataset.sample import encode, make_frame
+from fsid.dataset.worker import Worker
+
+FRAMES = 3
+_TAR_BLOCK = 512
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """seconds: of all pairs, by all workers. bytes: on disk. measured_pairs: what it is based on."""
+
+    pairs: int
+    shards: int
+    seconds: float
+    bytes: int
+    measured_pairs: int
+
+
+@dataclass(frozen=True)
+class _Trial:
+    config: GenerateConfig
+    seed: int
+    first_frame: int
+
+    def __str__(self) -> str:
+        return f"frame {self.first_frame}"
+
+    def do(self, worker: Worker) -> tuple[float, int, int]:
+        """Seconds, bytes in a tar and number of the pairs of `FRAMES` frames."""
+        self._make(worker, self.first_frame)
+        start = time.perf_counter()
+        made = [self._make(worker, self.first_frame + 1 + number) for number in range(FRAMES)]
+        return time.perf_counter() - start, sum(size for size, _ in made), sum(pairs for _, pairs in made)
+
+    def _make(self, worker: Worker, frame: int) -> tuple[int, int]:
+        samples = make_frame(self.config, self.seed, frame, worker.renderer(self.config))
+        files = [data for sample in samples for data in encode(sample).values()]
+        return sum(_TAR_BLOCK - len(data) // -_TAR_BLOCK * _TAR_BLOCK for data in files), len(samples)
+
+
+def estimate(config: GenerateConfig, *, count: int, seed: int, workforce: Workforce) -> Estimate:
+    """Cost of `count` samples made by `workforce`; writes nothing. FsidError as in `generate`."""
+    dataset = dataset_config(config, seed)
+    trials = [_Trial(config, seed, (1 + FRAMES) * worker) for worker in range(workforce.workers)]
+    results = [result for _, result in run(workforce.crew(), trials, tasks_per_worker=len(trials))]
+    pairs = sum(made for _, _, made in results)
+    seconds_per_pair = sum(seconds for seconds, _, _ in results) / pairs
+    return Estimate(
+        pairs=count,
+        shards=-(-count // dataset.shard_size),
+        seconds=count * seconds_per_pair / workforce.workers,
+        bytes=round(count * sum(size for _, size, _ in results) / pairs),
+        measured_pairs=pairs,
+    )

@@ -1,0 +1,67 @@
+"""One sample again, as loose files: from a dataset's settings and a key, or from the sample's JSON alone."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from fsid.config import from_plain, read_yaml
+from fsid.dataset.attempt import Sample
+from fsid.dataset.config import GenerateConfig
+from fsid.dataset.generate import DatasetConfig
+from fsid.dataset.sample import encode, make_sample, remake
+from fsid.dataset.shards import read_records, shard_path
+from fsid.dataset.worker import Worker
+from fsid.errors import FsidError
+from fsid.files import write_atomically
+
+
+def make_only(out: Path, key: str, config: GenerateConfig | None, seed: int) -> list[Path]:
+    """Make the sample `key` into `out` as KEY.clean.dng, KEY.noisy.dng ...; the paths of its files.
+
+    key: of a sample, or the path of its .json. config, seed: of the dataset; None takes those of the dataset
+    in `out`. Where the sample is in a shard of `out`, its record says what it is, redrawn or not.
+    """
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FsidError(f"{out}: cannot be written ({error.strerror})") from None
+    sample = _from_json(Path(key)) if key.endswith(".json") else _from_key(out, key, config, seed)
+    paths = []
+    for extension, data in encode(sample).items():
+        paths.append(out / f"{sample.key}.{extension}")
+        write_atomically(paths[-1], data)
+    return paths
+
+
+def _from_json(file: Path) -> Sample:
+    try:
+        record = json.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise FsidError(f"{file}: cannot be read ({error.strerror})") from None
+    except ValueError as error:
+        raise FsidError(f"{file}: is not valid JSON ({error})") from None
+    return _remake(record)
+
+
+def _from_key(out: Path, key: str, config: GenerateConfig | None, seed: int) -> Sample:
+    if not key.isdecimal():
+        raise FsidError(f"--only {key}: is neither the key of a sample, like 00000012, nor a .json file")
+    index, file = int(key), out / "config.yaml"
+    if file.exists():
+        dataset = from_plain(DatasetConfig, read_yaml(file), source=str(file))
+        if config is not None and (config, seed) != (dataset.generate, dataset.seed):
+            raise FsidError(f"{out}: holds a dataset of other settings or another seed; leave them out")
+        config, seed = dataset.generate, dataset.seed
+        shard = shard_path(out, index // dataset.shard_size)
+        records = read_records(shard) if shard.exists() else iter(())
+        if found := next((record for record in records if record["index"] == index), None):
+            return _remake(found)
+    config = config or GenerateConfig()
+    return make_sample(config, seed, index, Worker(None).renderer(config))
+
+
+def _remake(record: dict) -> Sample:
+    settings = record.get("settings") if isinstance(record, dict) else None
+    config = from_plain(GenerateConfig, settings or {}, source="settings")
+    return remake(record, Worker(None).renderer(config))

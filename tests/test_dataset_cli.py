@@ -1,0 +1,92 @@
+"""fsid generate: what it estimates, and one sample again from a key or its JSON."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from fsid.cli.main import main
+from fsid.dataset import generate_config, shard_path
+from fsid.dataset.shards import read_samples
+
+REPOSITORY = Path(__file__).resolve().parents[1]
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A dataset of five pairs from tiny pictures."""
+    folder = tmp_path_factory.mktemp("only")
+    (folder / "pictures").mkdir()
+    rng = np.random.default_rng(0)
+    for i in range(3):
+        Image.fromarray(rng.integers(0, 255, (64, 48, 3), np.uint8)).save(folder / "pictures" / f"{i}.png")
+    main([*words(folder), "--count", "5"])
+    return folder
+
+
+def words(folder: Path) -> list[str]:
+    """The command of the dataset, without its count."""
+    size = ["--width", "32", "--height", "32", "--quiet"]
+    return ["generate", str(folder / "data"), "--images", str(folder / "pictures"), "--seed", "4", *size]
+
+
+def loose(folder: Path, key: str) -> dict[str, bytes]:
+    return {path.name.partition(".")[2]: path.read_bytes() for path in folder.glob(f"{key}.*")}
+
+
+def test_only_makes_the_same_bytes_from_a_key_and_from_json(data: Path, tmp_path: Path) -> None:
+    stored = read_samples(shard_path(data / "data", 0))["00000003"]
+    main([*words(data)[:1], str(data / "data"), "--only", "00000003", "--quiet"])
+    assert loose(data / "data", "00000003") == stored
+    json = tmp_path / "00000003.json"
+    json.write_bytes(stored["json"])
+    main(["generate", str(tmp_path / "again"), "--only", str(json), "--quiet"])
+    assert loose(tmp_path / "again", "00000003") == stored
+    main([*(word.replace("/data", "/elsewhere") for word in words(data)), "--only", "3"])
+    assert loose(data / "elsewhere", "00000003") == stored
+
+
+@pytest.mark.parametrize(
+    ("only", "named"),
+    [("cat", "cat"), ("missing.json", "missing.json"), ("broken.json", "broken.json"), ("list.json", "JSON")],
+)
+def test_only_names_what_is_wrong(
+    only: str, named: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("broken.json").write_text("{")
+    Path("list.json").write_text("[]")
+    with pytest.raises(SystemExit) as exit_:
+        main(["generate", "out", "--only", only])
+    assert exit_.value.code == 2
+    assert named in capsys.readouterr().err
+    assert not list(tmp_path.glob("out/*"))
+
+
+def test_a_dry_run_estimates_and_writes_nothing(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    main([*words(data)[:-1], "--count", "5", "--dry-run"])
+    before = sorted(path.name for path in (data / "data").iterdir())
+    main([*words(data)[:-1], "--count", "160", "--dry-run", "--workers", "2"])
+    assert sorted(path.name for path in (data / "data").iterdir()) == before
+    text = capsys.readouterr().out
+    assert "160 pairs in 10 shards" in text
+    per_pair_mb = [float(mb) for mb in re.findall(r"([\d.e+-]+) MB per pair", text)]
+    stored_mb = shard_path(data / "data", 0).stat().st_size / 5e6
+    assert per_pair_mb == pytest.approx([stored_mb] * 2, rel=0.2)
+
+
+def test_a_count_is_needed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["generate", str(tmp_path / "out")])
+    assert "--count" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_papers_configuration_is_found_by_name_and_by_path() -> None:
+    config = generate_config("fsid-175k")
+    assert (config.width, config.height, config.variant) == (1920, 1080, "full")
+    assert generate_config(REPOSITORY / "configs" / "fsid-175k.yaml") == config
