@@ -29,7 +29,7 @@ from fsid.assets.bake_cache import cached, code_key, content_key
 from fsid.assets.maps import MaterialMaps
 from fsid.assets.streams import rng_of
 from fsid.assets.textures import PREFIX, TILE_M, bake_texture, texture_key
-from fsid.assets.triangle import Triple, hex_colours
+from fsid.assets.triangle import PICTURE, Triple, encode, hex_colours, srgb_to_linear
 from fsid.errors import FsidError
 
 MATERIAL_VARIANTS = 4
@@ -37,7 +37,16 @@ MATERIAL_VARIANTS = 4
 
 SHARED = tuple(
     f"fsid.assets.{name}"
-    for name in ("bake_cache", "maps", "material_registry", "patterns", "streams", "triangle")
+    for name in (
+        "bake_cache",
+        "maps",
+        "material_registry",
+        "patterns",
+        "pictures",
+        "streams",
+        "triangle",
+        "typeset",
+    )
 )
 """What the modules of families may import from FSID, and what is in the key of every bake."""
 
@@ -78,10 +87,11 @@ def material_family(
 
     tile_m: natural width of one tile. relief_m: height range that `height` 0..1 spans on such a tile.
     colours: three sRGB colours that colour_a, colour_b, colour_c have in nature, "b07a4a d7b58a 3b2a1e"; one
-    such text for all variants, one per variant, or none where any colours will do.
+    such text for all variants, one per variant, or none where any colours will do. "picture": the wide
+    triangle of `pictured`, for families that draw in full colour.
     """
     texts = (colours,) * MATERIAL_VARIANTS if isinstance(colours, str) else colours
-    triples = tuple(hex_colours(text) for text in texts)
+    triples = tuple(PICTURE if text == "picture" else hex_colours(text) for text in texts)
     assert len(triples) in (0, MATERIAL_VARIANTS), name
     assert all(len(triple) == 3 for triple in triples), name
 
@@ -91,6 +101,12 @@ def material_family(
         return function
 
     return register
+
+
+def pictured(encoded: np.ndarray) -> Layers:
+    """The masks of a picture (S, S, 3), sRGB 0..1, in a family whose colours are "picture"."""
+    mix, pattern, detail = encode(srgb_to_linear(encoded), PICTURE)
+    return Layers(mix, pattern, detail)
 
 
 def material_layer(name: str) -> Callable[[Overlay], Overlay]:

@@ -13,6 +13,9 @@ import numpy as np
 
 Triple = tuple[tuple[float, float, float], ...]
 
+PICTURE: Triple = ((1.35, 0.075, 0.075), (0.075, 1.35, 0.075), (0.075, 0.075, 1.35))
+"""A triangle around nearly all surface colours, bright enough for white: for what is drawn in full colour."""
+
 _EPSILON = 0.5 / 255
 """By how much a texel may miss the cone, linear: below 8-bit rounding."""
 

@@ -2,34 +2,17 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
-import matplotlib
 import numpy as np
-from PIL import ImageDraw, ImageFont
+from PIL import ImageDraw
 
 from fsid.assets.material_registry import Layers, material_family
 from fsid.assets.patterns import Draw, axes, edge, ink, level, noise, warp
-
-_FONTS = (
-    "DejaVuSans",
-    "DejaVuSerif",
-    "DejaVuSansMono",
-    "DejaVuSans-Bold",
-    "DejaVuSerif-Italic",
-    "DejaVuSerif-Bold",
-)
-_ALPHABETS = (
-    "eeeeettttaaaooiinnssrrhhlldcumfpgwybvkxjqz",
-    "οοαααιιεεττσσννηηυρπκμλωδγχθφβξζψ",
-    "ооеаааииинтттссрвллкммддпуяыьгзбчйхжшюцщэф",
-    "00112345678999",
-)
+from fsid.assets.typeset import averaged, canvas, paragraph, script_rand
 
 
 def _paper(rng: np.random.Generator, size: int) -> tuple[np.ndarray, np.ndarray]:
     """(fibres, ageing) of paper, mean 0, variance 1."""
-    return noise(rng, size, 0.4, low=size / 24), noise(rng, size, 1.8)
+    return noise(rng, size, 0.6, low=size / 30, high=size / 5), noise(rng, size, 1.8)
 
 
 def _on_paper(rng: np.random.Generator, size: int, printed: np.ndarray, gloss: float) -> Layers:
@@ -37,51 +20,33 @@ def _on_paper(rng: np.random.Generator, size: int, printed: np.ndarray, gloss: f
     fibre, age = _paper(rng, size)
     return Layers(
         mix=0.5 * level(age),
-        pattern=np.clip(printed * (0.96 + 0.03 * fibre), 0, 1),
-        detail=0.5 + 0.012 * fibre + 0.015 * age,
+        pattern=np.clip(printed * (0.97 + 0.01 * fibre), 0, 1),
+        detail=0.5 + 0.008 * fibre + 0.015 * age,
         roughness=gloss + 0.04 * fibre - 0.05 * printed,
         height=0.5 + 0.1 * fibre + 0.05 * age,
     )
 
 
-def _words_rand(rng: np.random.Generator, script: int, count: int) -> str:
-    letters = _ALPHABETS[script]
-    words = ["".join(rng.choice(list(letters), rng.integers(1, 11))) for _ in range(count)]
-    return " ".join(w.capitalize() if rng.random() < 0.15 else w for w in words)
-
-
-@material_family("printed_text", tile_m=0.25, relief_m=0.0001)
+@material_family("printed_text", tile_m=0.25, relief_m=0.0001, colours="f1ece0 e2d9c4 1d1b1a")
 def printed_text(rng: np.random.Generator, variant: int, size: int) -> Layers:
-    """Columns of text in several fonts, scripts and sizes, with headings and rules. Variant: columns."""
-    wide = size * 2
-    columns = (1, 2, 3, 4)[variant]
-    folder = Path(matplotlib.get_data_path()) / "fonts" / "ttf"
-    marks: list[Draw] = []
-
-    def line_of(text: str, font: ImageFont.FreeTypeFont, left: float, top: float) -> Draw:
-        return lambda draw, x, y: (
-            draw.text((left + x, top + y), text, font=font, fill=255) if x == y == 0 else None
-        )
-
+    """Columns of text in many fonts, scripts and sizes, with headings and rules. Variant: columns."""
+    image, draw = canvas(size)
+    wide, columns = 2 * size, (1, 2, 3, 4)[variant]
     for column in range(columns):
         left, right = (column + 0.06) * wide / columns, (column + 0.94) * wide / columns
         top = 0.02 * wide
         while top < 0.97 * wide:
-            script = int(rng.choice(4, p=(0.6, 0.12, 0.18, 0.1)))
+            script = script_rand(rng)
             points = int(
                 wide * rng.choice((0.008, 0.011, 0.014, 0.02, 0.045), p=(0.25, 0.3, 0.25, 0.12, 0.08))
             )
-            font = ImageFont.truetype(str(folder / f"{rng.choice(_FONTS)}.ttf"), max(points, 8))
-            for _ in range(1 if points > wide * 0.03 else int(rng.integers(2, 9))):
-                if top + points * 1.3 > 0.99 * wide:
-                    break
-                text = _words_rand(rng, script, int((right - left) / points / 2.4) + 2)
-                while text and font.getlength(text) > right - left:
-                    text = text[: int(len(text) * (right - left) / font.getlength(text) * 0.99)]
-                marks.append(line_of(text, font, left, top))
-                top += points * 1.3
+            lines = 1.3 * points * (1 if points > wide * 0.03 else int(rng.integers(2, 9)))
+            bottom = min(top + lines + 1, 0.99 * wide)
+            top = max(paragraph(rng, draw, (left, top, right, bottom), points, 255, script), top + points)
+            if rng.random() < 0.15:
+                draw.line((left, top, right, top), fill=255, width=int(rng.integers(1, 6)))
             top += points * rng.uniform(0.2, 1.2)
-    return _on_paper(rng, size, ink(size, marks), 0.75)
+    return _on_paper(rng, size, averaged(image), 0.75)
 
 
 @material_family("test_chart", tile_m=0.4, relief_m=0.0001)
