@@ -10,7 +10,7 @@ torch = pytest.importorskip("torch")
 
 from safetensors.torch import save_file  # noqa: E402
 
-from fsid.denoise import ModelCard, NetworkConfig, RawDenoiser, load_model, save_model  # noqa: E402
+from fsid.denoise import ModelCard, NetworkConfig, RawDenoiser, load_denoiser, save_model  # noqa: E402
 from fsid.errors import FsidError  # noqa: E402
 
 CARD = ModelCard(NetworkConfig(width=4), patch_px=16, training="3 images of test", details={"steps": 1})
@@ -29,7 +29,7 @@ def test_round_trip(tmp_path: Path) -> None:
         torch.nn.init.normal_(parameter)
     save_model(tmp_path / "model.safetensors", net.state_dict(), CARD)
     for given in (tmp_path, tmp_path / "model.safetensors"):
-        loaded = load_model(given)
+        loaded = load_denoiser(given)
         assert loaded.card == CARD
         for name, tensor in net.state_dict().items():
             assert torch.equal(loaded.net.state_dict()[name], tensor)
@@ -44,19 +44,19 @@ def test_an_untrained_network_is_the_identity() -> None:
 
 def test_what_is_not_a_model_is_named(model_file: Path, tmp_path: Path) -> None:
     with pytest.raises(FsidError, match="no-such"):
-        load_model(tmp_path / "no-such")
+        load_denoiser(tmp_path / "no-such")
     data = model_file.read_bytes()
     for broken in (b"", b"\x80\x04pickle", data[:100], data[:-10]):
         model_file.write_bytes(broken)
         with pytest.raises(FsidError, match=r"model\.safetensors"):
-            load_model(model_file)
+            load_denoiser(model_file)
 
 
 def test_a_file_that_does_not_fit_its_card_is_named(model_file: Path) -> None:
     weights = RawDenoiser(CARD.network).state_dict()
     save_file({name: tensor.contiguous() for name, tensor in weights.items()}, model_file)
     with pytest.raises(FsidError, match="no FSID model card"):
-        load_model(model_file)
+        load_denoiser(model_file)
     for change, message in (
         ({"net.intro.bias": torch.full((4,), torch.nan)}, "NaN"),
         ({"net.intro.bias": torch.zeros(5)}, r"\(5,\), expected \(4,\)"),
@@ -64,8 +64,8 @@ def test_a_file_that_does_not_fit_its_card_is_named(model_file: Path) -> None:
     ):
         save_model(model_file, weights | change, CARD)
         with pytest.raises(FsidError, match=message):
-            load_model(model_file)
+            load_denoiser(model_file)
     del weights["net.intro.bias"]
     save_model(model_file, weights, CARD)
     with pytest.raises(FsidError, match=r"lacks tensor net\.intro\.bias"):
-        load_model(model_file)
+        load_denoiser(model_file)

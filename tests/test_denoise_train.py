@@ -24,8 +24,8 @@ from fsid.denoise import (  # noqa: E402
     NetworkConfig,
     TrainConfig,
     denoise_raw,
+    load_denoiser,
     load_history,
-    load_model,
     train,
 )
 from fsid.denoise.train import learning_rate  # noqa: E402
@@ -87,7 +87,7 @@ def test_training_denoises(data: Path, tmp_path: Path) -> None:
     network = replace(CONFIG.network, width=8)
     short = {"steps": 150, "batch": 4, "warmup_steps": 10, "learning_rate": 1e-2, "ema_decay": 0.9}
     config = replace(CONFIG, network=network, log_every=10, **short)
-    model = load_model(train(data, tmp_path / "run", config, quiet=True))
+    model = load_denoiser(train(data, tmp_path / "run", config, quiet=True))
     rng = np.random.default_rng(2)
     clean, level = patches_of_colour(rng), load_profile("pixel6").level(3200)
     noisy = add_noise(rng, clean, level)
@@ -145,10 +145,10 @@ def test_the_best_network_on_held_out_scenes_is_kept(tmp_path: Path) -> None:
     assert card["details"]["config"]["seed"] == 0
     assert card["sessions"][-1]["first_step"] == 0
     assert card["training"].startswith("8 images")
-    last = load_model(tmp_path / "run" / "last.safetensors").net.state_dict()
+    last = load_denoiser(tmp_path / "run" / "last.safetensors").net.state_dict()
     watch = validation(held_out(folder, config), config, torch.device("cpu"))
     assert watch.measure(last)["psnr_scenes"] == pytest.approx(scores[-1], abs=1e-9)
-    best = load_model(model).net.state_dict()
+    best = load_denoiser(model).net.state_dict()
     assert watch.measure(best)["psnr_scenes"] == pytest.approx(max(scores), abs=1e-9)
 
 

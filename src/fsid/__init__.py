@@ -1,7 +1,36 @@
 """FSID: RAW denoisers trained on nothing but rendered scenes.
 
+    raw = fsid.read_raw("photo.dng")
+    clean = fsid.denoise(raw, "pixel6")       # fsid.denoise(raw): the noise level of the file, or the image's
+    fsid.write_dng("clean.dng", clean)
+
 Data flows one way, and each step is a package: assets -> scene -> render -> sensor -> dataset ->
-denoise -> evaluate -> cli. See docs/architecture.md.
+denoise -> evaluate -> cli. See docs/architecture.md. Importing `fsid` loads none of them: these names do.
 """
 
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from fsid.denoise import load_model
+    from fsid.sensor import develop, read_raw, write_dng
+
 __version__ = "0.1.0"
+__all__ = ["denoise", "develop", "load_model", "read_raw", "write_dng"]
+
+_HOMES = {
+    "load_model": "fsid.denoise",
+    "develop": "fsid.sensor",
+    "read_raw": "fsid.sensor",
+    "write_dng": "fsid.sensor",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name == "denoise":  # a package that can be called
+        return import_module("fsid.denoise")
+    if name in _HOMES:
+        return getattr(import_module(_HOMES[name]), name)
+    raise AttributeError(f"module 'fsid' has no attribute {name!r}")

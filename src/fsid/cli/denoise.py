@@ -1,22 +1,30 @@
-"""fsid denoise: a noisy RAW file in, a denoised DNG out."""
+"""fsid denoise: noisy RAW files in, denoised DNGs out."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING, Literal
 
+from rich.console import Console
+from rich.text import Text
 from tyro.conf import Positional
 
 from fsid.cli.progress import progress_bar
 from fsid.errors import FsidError
+
+if TYPE_CHECKING:
+    from fsid.denoise import MosaicLayout
 
 
 def denoise(
     input: Positional[Path],
     output: Positional[Path],
     *,
-    model: Path,
+    model: Path | None = None,
     profile: str | None = None,
     iso: float | None = None,
+    strength: float = 1.0,
+    backend: Literal["torch", "onnx"] | None = None,
     cfa: str | None = None,
     black_level: int | None = None,
     white_level: int | None = None,
@@ -24,30 +32,71 @@ def denoise(
     height: int | None = None,
     quiet: bool = False,
 ) -> None:
-    """Denoise a Bayer RAW of any size, in tiles. The noise level is the file's NoiseProfile or a profile's.
+    """Denoise a Bayer RAW of any size, or a folder of them. The noise level is the file's NoiseProfile, that
+    of a profile, or else estimated from the image.
 
     Args:
-        input: DNG or any other Bayer RAW that LibRaw opens; or a bare mosaic (.npy, 16-bit .png or .tif,
-            .raw or .bin of 16-bit little-endian values), given --cfa, --black-level and --white-level.
-        output: DNG file to write.
-        model: Folder of a training (fsid train), or its model.safetensors.
-        profile: Noise profile, a built-in name (fsid profiles) or a file; by default the file's own.
+        input: DNG or any other Bayer RAW that LibRaw opens; a folder of them; or a bare mosaic (.npy, 16-bit
+            .png or .tif, .raw or .bin of 16-bit little-endian values), given --cfa, --black-level and
+            --white-level.
+        output: DNG file to write; a folder where the input is one.
+        model: Folder of a training (fsid train), its model.safetensors, a file of fsid export (.onnx or
+            .safetensors), or the name of a shipped network; by default the shipped one.
+        profile: Noise profile, a built-in name (fsid profiles) or a file; by default the file's own noise.
         iso: ISO of the profile's level; by default the file's.
+        strength: 0 to 1: share of the noise's amplitude to remove (1 all of it, less leaves grain). Above 1:
+            take the noise for that many times as strong, which smooths more.
+        backend: What runs the network: torch (on a GPU where there is one) or onnx (onnxruntime, on the CPU);
+            by default onnx for an .onnx file, else torch.
         cfa: Colours of a bare mosaic's first 2x2 pixels, read row by row: RGGB, BGGR, GRBG or GBRG.
         black_level: Black level of a bare mosaic in DN.
         white_level: White level (saturation) of a bare mosaic in DN.
         width: Width of a .raw or .bin mosaic in pixels.
         height: Height of a .raw or .bin mosaic in pixels.
-        quiet: No progress bar.
+        quiet: No progress bar, no line on the noise level.
     """
-    from fsid.denoise import MosaicLayout, denoise_file, load_model
+    from fsid.denoise import denoise_file, denoise_folder, find_raws, load_model
 
-    layout = None
-    if cfa is not None or black_level is not None or white_level is not None:
-        if cfa is None or black_level is None or white_level is None:
-            raise FsidError("a bare mosaic needs all three: --cfa, --black-level and --white-level")
-        layout = MosaicLayout(cfa, black_level, white_level, width, height)
-    with progress_bar("denoising", "tiles", quiet=quiet) as progress:
-        denoise_file(
-            input, output, load_model(model), profile=profile, iso=iso, layout=layout, progress=progress
+    layout = _layout(cfa, black_level, white_level, width, height)
+    sources = find_raws(input) if input.is_dir() else None
+    network = load_model(model, backend)
+    console = Console(stderr=True)
+    with progress_bar("denoising", "tiles" if sources is None else "files", quiet=quiet) as progress:
+        if sources is not None:
+            denoise_folder(
+                sources,
+                output,
+                network,
+                profile=profile,
+                iso=iso,
+                strength=strength,
+                layout=layout,
+                progress=progress,
+                failed=lambda error: console.print(Text(f"fsid: {error}", style="bold red"), soft_wrap=True),
+            )
+            return
+        noise = denoise_file(
+            input,
+            output,
+            network,
+            profile=profile,
+            iso=iso,
+            strength=strength,
+            layout=layout,
+            progress=progress,
         )
+    if not quiet:
+        k, sigma2 = (sum(values) / 4 for values in (noise.level.k, noise.level.sigma2))
+        console.print(f"noise: {noise.source}, k = {k:.3g}, sigma2 = {sigma2:.3g}", soft_wrap=True)
+
+
+def _layout(
+    cfa: str | None, black_level: int | None, white_level: int | None, width: int | None, height: int | None
+) -> MosaicLayout | None:
+    from fsid.denoise import MosaicLayout
+
+    if cfa is None and black_level is None and white_level is None:
+        return None
+    if cfa is None or black_level is None or white_level is None:
+        raise FsidError("a bare mosaic needs all three: --cfa, --black-level and --white-level")
+    return MosaicLayout(cfa, black_level, white_level, width, height)

@@ -1,17 +1,23 @@
 """RAW denoising networks: train them on shards, load them, run them on files of any size.
 
+The package itself can be called: `fsid.denoise(raw)` is `fsid.denoise.interface.denoise`.
+
 OpenMP's threads sleep while they wait, unless the environment says otherwise: on a machine that others use
 too, threads that spin keep each other from working (a training step on two threads took ten times as long).
 OpenMP reads this once, when PyTorch is imported.
 """
 
 import os
+import sys
+from types import ModuleType
 
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
-from fsid.denoise.denoise import denoise_raw
-from fsid.denoise.files import MosaicLayout, denoise_file
-from fsid.denoise.model import Denoiser, ModelCard, load_model, save_model
+from fsid.denoise.denoise import Network, denoise_raw
+from fsid.denoise.files import MosaicLayout, Noise, denoise_file, denoise_folder, find_raws, noise_of
+from fsid.denoise.interface import denoise as _denoise
+from fsid.denoise.interface import load_model
+from fsid.denoise.model import Denoiser, ModelCard, load_denoiser, save_model
 from fsid.denoise.raw_denoiser import NetworkConfig, RawDenoiser
 from fsid.denoise.train import load_history, train
 from fsid.denoise.train_config import TrainConfig, train_config
@@ -20,14 +26,27 @@ __all__ = [
     "Denoiser",
     "ModelCard",
     "MosaicLayout",
+    "Network",
     "NetworkConfig",
+    "Noise",
     "RawDenoiser",
     "TrainConfig",
     "denoise_file",
+    "denoise_folder",
     "denoise_raw",
+    "find_raws",
+    "load_denoiser",
     "load_history",
     "load_model",
+    "noise_of",
     "save_model",
     "train",
     "train_config",
 ]
+
+
+class _CallablePackage(ModuleType):
+    __call__ = staticmethod(_denoise)
+
+
+sys.modules[__name__].__class__ = _CallablePackage

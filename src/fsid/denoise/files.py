@@ -1,4 +1,7 @@
-"""A RAW file in, a denoised DNG out."""
+"""RAW files in, denoised DNGs out.
+
+noise of a file = profile at an ISO, if one is named | its own `NoiseProfile` | what the image itself shows
+"""
 
 from __future__ import annotations
 
@@ -6,11 +9,25 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from fsid.denoise.denoise import denoise_raw
-from fsid.denoise.model import Denoiser
+from fsid.denoise.denoise import Network, denoise_raw
+from fsid.denoise.preview import preview_of
 from fsid.errors import FsidError
-from fsid.sensor import NoiseLevel, Raw, clean_levels, load_profile, read_mosaic, read_raw, write_dng
+from fsid.sensor import (
+    NoiseLevel,
+    Raw,
+    clean_levels,
+    estimate_noise,
+    load_profile,
+    read_mosaic,
+    read_raw,
+    write_dng,
+)
 from fsid.sensor.bare import BARE_SUFFIXES
+
+RAW_SUFFIXES = frozenset(
+    """.3fr .arw .cr2 .cr3 .crw .dcr .dng .erf .fff .iiq .k25 .kdc .mef .mos .mrw .nef .nrw .orf .pef .raf
+    .rw2 .rwl .sr2 .srf .srw""".split()  # noqa: SIM905  a list of them would take a page
+)
 
 
 @dataclass(frozen=True)
@@ -22,6 +39,24 @@ class MosaicLayout:
     white_level: int
     width: int | None = None
     height: int | None = None
+
+
+@dataclass(frozen=True)
+class Noise:
+    """A noise level, and in words where it came from."""
+
+    level: NoiseLevel
+    source: str
+
+
+def find_raws(folder: Path) -> list[Path]:
+    """The RAW files directly inside `folder`, sorted by name; FsidError where there is none."""
+    if not folder.is_dir():
+        raise FsidError(f"{folder}: is not a folder of RAW files")
+    raws = sorted(path for path in folder.iterdir() if path.suffix.lower() in RAW_SUFFIXES)
+    if not raws:
+        raise FsidError(f"{folder}: holds no RAW file ({', '.join(sorted(RAW_SUFFIXES))})")
+    return raws
 
 
 def read_input(path: Path, layout: MosaicLayout | None) -> Raw:
@@ -42,37 +77,86 @@ def read_input(path: Path, layout: MosaicLayout | None) -> Raw:
     return read_raw(path)
 
 
-def noise_level(raw: Raw, profile: str | None, iso: float | None, path: Path) -> NoiseLevel:
-    """The level of a profile at an ISO (by default the file's ISO), or else the file's own `NoiseProfile`."""
+def noise_of(raw: Raw, profile: str | None, iso: float | None, path: Path) -> Noise:
+    """The level of a profile at an ISO (by default the file's), else the file's own, else the image's."""
     if profile is not None:
         iso = iso if iso is not None else raw.iso
         if not iso > 0:
             raise FsidError(f"{path}: its ISO is unknown, give --iso")
-        return load_profile(profile).level(iso)
+        return Noise(load_profile(profile).level(iso), f"profile {profile} at ISO {iso:g}")
     if iso is not None:
         raise FsidError("--iso: names a level of a camera; give --profile too (fsid profiles lists them)")
-    if raw.noise is None:
+    if raw.noise is not None:
+        return Noise(raw.noise, "the file's NoiseProfile")
+    try:
+        return Noise(estimate_noise(raw).level, "estimated from the image")
+    except FsidError as error:
         raise FsidError(
-            f"{path}: holds no NoiseProfile; give --profile NAME --iso N (fsid profiles lists them)"
-        )
-    return raw.noise
+            f"{path}: holds no NoiseProfile, and {error}; give --profile NAME --iso N "
+            "(fsid profiles lists them)"
+        ) from None
 
 
 def denoise_file(
     source: Path,
     target: Path,
-    model: Denoiser,
+    model: Network,
     *,
     profile: str | None = None,
     iso: float | None = None,
+    strength: float = 1.0,
     layout: MosaicLayout | None = None,
     progress: Callable[[int, int], None] | None = None,
-) -> None:
-    """Denoise one RAW file into a DNG with 64 times finer levels (a denoised value is no whole DN)."""
+) -> Noise:
+    """Denoise one RAW file into a DNG with finer levels (a denoised value is no whole DN) and a preview.
+
+    The noise level that was used is returned. FsidError: `denoise_raw`, unreadable input, another suffix.
+    """
     if target.suffix.lower() != ".dng":
         raise FsidError(f"{target}: a denoised RAW is written as .dng")
     raw = read_input(source, layout)
+    noise = noise_of(raw, profile, iso, source)
     if iso is not None:
         raw = replace(raw, iso=iso)
-    denoised = denoise_raw(raw, model, noise_level(raw, profile, iso, source), progress=progress)
-    write_dng(target, clean_levels(denoised))
+    clean = denoise_raw(raw, model, noise.level, strength=strength, progress=progress)
+    write_dng(target, clean_levels(clean), preview_of(clean))
+    return noise
+
+
+def denoise_folder(
+    sources: list[Path],
+    target: Path,
+    model: Network,
+    *,
+    profile: str | None = None,
+    iso: float | None = None,
+    strength: float = 1.0,
+    layout: MosaicLayout | None = None,
+    progress: Callable[[int, int], None] | None = None,
+    failed: Callable[[FsidError], None] = lambda error: None,
+) -> None:
+    """Denoise each of `sources` into a DNG of its name in the folder `target`, which is made.
+
+    failed: told of each file that cannot be denoised; FsidError says in the end how many they were.
+    """
+    names = [source.stem for source in sources]
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise FsidError(f"{sources[0].parent}: several files would become {twice[0]}.dng; rename one")
+    try:
+        target.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FsidError(f"{target}: cannot be written ({error.strerror})") from None
+    failures = 0
+    for done, source in enumerate(sources):
+        out = target / f"{source.stem}.dng"
+        if out.resolve() == source.resolve():
+            raise FsidError(f"{target}: is the folder of the originals, which would be overwritten")
+        try:
+            denoise_file(source, out, model, profile=profile, iso=iso, strength=strength, layout=layout)
+        except FsidError as error:
+            failures += 1
+            failed(error)
+        if progress is not None:
+            progress(done + 1, len(sources))
+    if failures:
+        raise FsidError(f"{failures} of {len(sources)} files could not be denoised")

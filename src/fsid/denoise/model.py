@@ -64,6 +64,11 @@ class Denoiser:
         """How far an output reaches once the averages are given, in packed pixels."""
         return self.net.net.receptive_radius
 
+    @property
+    def attention_widths(self) -> tuple[int, ...]:
+        """How many averages each block takes, in the order of `spatial_means`."""
+        return tuple(len(block.norm1.weight) for block in self.net.modules() if isinstance(block, NAFBlock))
+
     @torch.no_grad()
     def averages(self, patch: np.ndarray, level: NoiseLevel) -> np.ndarray:
         """The averages that channel attention takes over `patch` (4, h, w), one after the other: (n,)."""
@@ -73,8 +78,7 @@ class Denoiser:
     @torch.no_grad()
     def run(self, tile: np.ndarray, level: NoiseLevel, averages: np.ndarray) -> np.ndarray:
         """The clean estimate (4, h, w) of `tile` with channel attention held at `averages` (n,)."""
-        widths = [len(block.norm1.weight) for block in self.net.modules() if isinstance(block, NAFBlock)]
-        parts = torch.from_numpy(averages).to(self.device).split(widths)
+        parts = torch.from_numpy(averages).to(self.device).split(list(self.attention_widths))
         with frozen_pooling(self.net, [part[None, :, None, None] for part in parts]):
             return self.net(*self._inputs(tile, level))[0].cpu().numpy()
 
@@ -111,7 +115,7 @@ def model_path(run_or_file: str | Path | None) -> Path:
     return path / MODEL_FILE if path.is_dir() else path
 
 
-def load_model(run_or_file: str | Path | None = None, device: str | torch.device = "cpu") -> Denoiser:
+def load_denoiser(run_or_file: str | Path | None = None, device: str | torch.device = "cpu") -> Denoiser:
     """Load a run folder's network, a .safetensors file, or a shipped network by name; None: the default one.
 
     Weights may be stored in half precision; they are used in single. Raises FsidError where the file is

@@ -1,0 +1,58 @@
+"""The denoiser in a few lines of Python: load a network once, denoise RAW images with it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+import torch
+
+from fsid.denoise.denoise import Network, denoise_raw
+from fsid.denoise.files import noise_of
+from fsid.denoise.model import load_denoiser, model_path
+from fsid.denoise.onnx_denoiser import load_onnx, onnx_denoiser
+from fsid.errors import FsidError
+from fsid.sensor import Raw, clean_levels
+
+Backend = Literal["torch", "onnx"]
+
+
+def load_model(model: str | Path | None = None, backend: Backend | None = None) -> Network:
+    """A network that is ready to denoise.
+
+    model: run folder, .safetensors or .onnx file, or the name of a shipped network; None: the default one.
+    backend: what runs it, None: onnxruntime for an .onnx file, else PyTorch (on a GPU where there is one).
+    PyTorch weights are converted for backend "onnx", which takes some seconds. FsidError: no such network,
+    a broken file, or an .onnx file for PyTorch.
+    """
+    path = model_path(model)
+    if path.suffix.lower() == ".onnx":
+        if backend == "torch":
+            raise FsidError(f"{path}: is run by onnxruntime, not PyTorch; leave out the backend")
+        return load_onnx(path)
+    denoiser = load_denoiser(path, "cuda" if torch.cuda.is_available() and backend != "onnx" else "cpu")
+    if backend != "onnx":
+        return denoiser
+    from fsid.denoise.onnx_export import onnx_bytes
+
+    return onnx_denoiser(onnx_bytes(denoiser), str(path))
+
+
+def denoise(
+    raw: Raw,
+    profile: str | Path | None = None,
+    *,
+    iso: float | None = None,
+    model: Network | str | Path | None = None,
+    strength: float = 1.0,
+) -> Raw:
+    """The clean estimate of `raw`, with levels fine enough to store it, as `fsid denoise` makes it.
+
+    profile: a camera's noise profile, by name or file, taken at `iso` or at the ISO of `raw`; None takes the
+    noise level that `raw` knows, and else estimates it from the image. model: see `load_model`; load it once
+    to denoise many images. strength: 0..1 is the share of the noise that is removed, above 1 smooths more.
+    Raises FsidError.
+    """
+    network = load_model(model) if model is None or isinstance(model, str | Path) else model
+    noise = noise_of(raw, None if profile is None else str(profile), iso, Path(raw.camera))
+    return clean_levels(denoise_raw(raw, network, noise.level, strength=strength))

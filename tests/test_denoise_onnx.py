@@ -1,0 +1,91 @@
+"""An exported network means the same as the network: one call, tiles, any size, and no package needed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch")
+pytest.importorskip("onnxscript")
+onnx = pytest.importorskip("onnx")
+onnxruntime = pytest.importorskip("onnxruntime")
+
+from fsid.denoise import Denoiser, ModelCard, NetworkConfig, RawDenoiser, denoise_raw  # noqa: E402
+from fsid.denoise.onnx_denoiser import OnnxDenoiser, load_onnx, onnx_denoiser  # noqa: E402
+from fsid.denoise.onnx_export import onnx_bytes  # noqa: E402
+from fsid.errors import FsidError  # noqa: E402
+from fsid.sensor import Raw, load_profile  # noqa: E402
+
+NETWORK = NetworkConfig(width=4, encoder_blocks=(1, 1), middle_blocks=1, decoder_blocks=(1, 1))
+LEVEL = load_profile("pixel6").level(3200)
+
+
+@pytest.fixture(scope="module")
+def denoiser() -> Denoiser:
+    torch.manual_seed(0)
+    net = RawDenoiser(NETWORK)
+    for name, parameter in net.named_parameters():
+        if name.endswith(("beta", "gamma", "ending.weight")):
+            torch.nn.init.normal_(parameter, std=0.3)
+    return Denoiser(net.eval().requires_grad_(False), ModelCard(NETWORK, 16), torch.device("cpu"))
+
+
+@pytest.fixture(scope="module")
+def exported(denoiser: Denoiser) -> bytes:
+    return onnx_bytes(denoiser)
+
+
+@pytest.fixture(scope="module")
+def network(exported: bytes) -> OnnxDenoiser:
+    return onnx_denoiser(exported, "test")
+
+
+def noisy_raw(rng: np.random.Generator, height: int, width: int, cfa: str = "RGGB") -> Raw:
+    x = np.linspace(0, 0.8, width, dtype=np.float32) + 0.05 * rng.standard_normal((height, width))
+    return Raw(x.astype(np.float32), cfa, 64, 1023, (2.0, 1.0, 1.5), np.eye(3), "test", 3200, LEVEL)
+
+
+@pytest.mark.parametrize(("height", "width", "cfa"), [(64, 64, "RGGB"), (98, 146, "GBRG"), (34, 200, "BGGR")])
+def test_whole_and_in_tiles_it_equals_pytorch(
+    rng: np.random.Generator, denoiser: Denoiser, network: OnnxDenoiser, height: int, width: int, cfa: str
+) -> None:
+    raw = noisy_raw(rng, height, width, cfa)
+    expected = denoise_raw(raw, denoiser, tile_px=4096).mosaic
+    assert np.abs(expected - raw.mosaic).mean() > 1e-3
+    for tile_px in (4096, 24):
+        np.testing.assert_allclose(
+            denoise_raw(raw, network, tile_px=tile_px).mosaic, expected, atol=1e-4, rtol=0
+        )
+
+
+def test_the_graph_alone_is_enough(rng: np.random.Generator, denoiser: Denoiser, exported: bytes) -> None:
+    """Three inputs, any size, plain onnxruntime: what a phone would do with a whole image."""
+    session = onnxruntime.InferenceSession(exported, providers=["CPUExecutionProvider"])
+    packed = rng.random((1, 4, 23, 37), dtype=np.float32)
+    k, sigma2 = np.array([LEVEL.k], np.float32), np.array([LEVEL.sigma2], np.float32)
+    (clean,) = session.run(["clean"], {"noisy": packed, "k": k, "sigma2": sigma2})
+    expected = denoiser.net(*map(torch.from_numpy, (packed, k, sigma2))).numpy()
+    np.testing.assert_allclose(clean, expected, atol=1e-4)
+    notes = session.get_modelmeta().custom_metadata_map
+    for word in ("black", "R, Gr, Gb, B", "NoiseProfile", "receptive_radius", "unpack"):
+        assert word.lower() in notes["description"].lower()
+    assert notes["multiple"] == "4"
+    assert notes["patch_px"] == "16"
+
+
+def test_what_is_no_exported_network_is_named(tmp_path: Path) -> None:
+    for content in (b"", b"\x80\x04pickle"):
+        (tmp_path / "broken.onnx").write_bytes(content)
+        with pytest.raises(FsidError, match=r"broken\.onnx"):
+            load_onnx(tmp_path / "broken.onnx")
+    with pytest.raises(FsidError, match=r"none\.onnx"):
+        load_onnx(tmp_path / "none.onnx")
+    value = onnx.helper.make_tensor_value_info("x", onnx.TensorProto.FLOAT, [1])
+    out = onnx.helper.make_tensor_value_info("y", onnx.TensorProto.FLOAT, [1])
+    graph = onnx.helper.make_graph([onnx.helper.make_node("Neg", ["x"], ["y"])], "g", [value], [out])
+    model = onnx.helper.make_model(graph, opset_imports=[onnx.helper.make_opsetid("", 17)], ir_version=8)
+    (tmp_path / "other.onnx").write_bytes(model.SerializeToString())
+    with pytest.raises(FsidError, match=r"other\.onnx: is not a file of `fsid export`"):
+        load_onnx(tmp_path / "other.onnx")
