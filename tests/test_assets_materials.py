@@ -11,6 +11,7 @@ from fsid.assets import (
     material_layers,
     material_tile_m,
 )
+from fsid.assets.material_registry import draw_material
 from fsid.assets.patterns import cells, level, noise, shade, stack, warp
 from fsid.errors import FsidError
 
@@ -49,6 +50,10 @@ class TestEveryFamily:
                 for image in (field, field.T):
                     steps = np.abs(np.roll(image, -1, axis=0) - image).mean(1)
                     assert steps[-1] <= 1.5 * steps[:-1].max() + 1e-4, (variant, name)
+
+    def test_the_smallest_size_works_too(self, family):
+        for variant in range(MATERIAL_VARIANTS):
+            assert np.isfinite(draw_material(family, variant, 64).detail).all()
 
     def test_no_map_is_mostly_clipped(self, baked, family):
         for variant in range(MATERIAL_VARIANTS):

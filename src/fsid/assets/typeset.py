@@ -62,7 +62,9 @@ def words_rand(rng: np.random.Generator, script: str, count: int) -> str:
 
 def fitted(text: str, face: ImageFont.FreeTypeFont, width: float) -> str:
     """As much of the beginning of `text` as is `width` pixels wide."""
-    while text and face.getlength(text) > width:
+    if width <= 0:
+        return ""
+    while face.getlength(text) > width:
         text = text[: min(len(text) - 1, int(len(text) * width / face.getlength(text)))]
     return text
 
@@ -75,8 +77,12 @@ def paragraph(
     fill: int | tuple[int, int, int],
     script: str,
 ) -> float:
-    """Fill a box (left, top, right, bottom) with lines of one font, ragged right; returns the end's y."""
+    """Fill a box (left, top, right, bottom) with lines of one font, ragged right; returns the end's y.
+
+    points: size of the font in pixels, at least 6.
+    """
     left, y, right, bottom = box
+    points = max(points, 6)
     face = font_rand(rng, script, points)
     while y + points * 1.3 <= bottom:
         text = words_rand(rng, script, int((right - left) / points / 2.4) + 2)

@@ -151,12 +151,13 @@ def comic(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """Panels with flat colours, black outlines, dot screens and lettering."""
     image, draw = canvas(size, (248, 246, 235))
     wide, rows = 2 * size, (2, 3, 3, 4)[variant]
+    gap, pen = 0.006 * wide, max(1, round(wide / 250))
     for row in range(rows):
         cuts = np.r_[0, np.cumsum(rng.dirichlet(np.full(rng.integers(1, 4), 4.0)))] * wide
         for left, right in pairwise(cuts):
-            box = (left + 12, row * wide / rows + 12, right - 12, (row + 1) * wide / rows - 12)
+            box = (left + gap, row * wide / rows + gap, right - gap, (row + 1) * wide / rows - gap)
             high, across = int(box[3] - box[1]), int(box[2] - box[0])
-            if across < 20:
+            if across < 10 * gap:
                 continue
             picture = picture_rand(rng, max(high // 4, 8), max(across // 4, 8))
             flat = np.round(picture * 4) / 4
@@ -164,12 +165,14 @@ def comic(rng: np.random.Generator, variant: int, size: int) -> Layers:
             panel = np.asarray(small.resize((across, high), Image.Resampling.NEAREST))
             y, x = np.mgrid[0:high, 0:across]
             dots = ((x % 10 - 5) ** 2 + (y % 10 - 5) ** 2 < 9)[..., None]
-            drawn = (np.abs(panel - np.roll(panel, (5, 5), (0, 1)).astype(float)) > 30).any(-1, keepdims=True)
+            drawn = (np.abs(panel - np.roll(panel, (pen // 2 + 1,) * 2, (0, 1)).astype(float)) > 30).any(
+                -1, keepdims=True
+            )
             shown = np.where(drawn, 12.0, np.where(dots, panel * 0.8, panel)) / 255
             _paste(image, shown, box[0], box[1])
-            draw.rectangle(box, outline=(10, 10, 10), width=8)
-            balloon = (box[0] + 10, box[1] + 10, box[0] + 0.6 * across, box[1] + 0.3 * high)
-            draw.ellipse(balloon, fill=(250, 250, 250), outline=(10, 10, 10), width=5)
+            draw.rectangle(box, outline=(10, 10, 10), width=pen)
+            balloon = (box[0] + gap, box[1] + gap, box[0] + 0.6 * across, box[1] + 0.3 * high)
+            draw.ellipse(balloon, fill=(250, 250, 250), outline=(10, 10, 10), width=max(1, pen // 2))
             inner = (balloon[0] + 0.1 * across, balloon[1] + 0.06 * high, balloon[2], balloon[3])
             paragraph(rng, draw, inner, int(wide * 0.014), (10, 10, 10), "latin")
     return _printed(rng, averaged(image), 0.65)
@@ -181,34 +184,41 @@ def screen(rng: np.random.Generator, variant: int, size: int) -> Layers:
     dark = variant % 2 == 1
     image, draw = canvas(size, (24, 26, 32) if dark else (70, 110, 150))
     wide = 2 * size
+    em = wide / 100
     for _ in range((9, 12, 16, 22)[variant]):
         w, h = rng.uniform(0.25, 0.6) * wide, rng.uniform(0.2, 0.5) * wide
         x, y = rng.beta(0.6, 0.6, 2) * (0.98 * wide - w, 0.98 * wide - h) + 0.01 * wide
         body = _colour(np.full(3, 0.1 if dark else 0.95) + 0.04 * rng.normal(size=3))
         draw.rectangle((x, y, x + w, y + h), fill=body, outline=(128, 128, 128))
-        draw.rectangle((x, y, x + w, y + 36), fill=_colour(hue_rand(rng, 0.3, 0.35 if dark else 0.8)))
+        draw.rectangle((x, y, x + w, y + 1.8 * em), fill=_colour(hue_rand(rng, 0.3, 0.35 if dark else 0.8)))
         for k, tone in enumerate(((230, 90, 80), (230, 180, 60), (90, 190, 90))):
-            draw.ellipse((x + 10 + 26 * k, y + 10, x + 26 + 26 * k, y + 26), fill=tone)
+            left = x + (0.5 + 1.3 * k) * em
+            draw.ellipse((left, y + 0.5 * em, left + 0.8 * em, y + 1.3 * em), fill=tone)
         kind = int(rng.integers(3))
         if kind == 0:
-            _program(rng, image, (x + 10, y + 46, x + w, y + h), dark)
+            _program(rng, draw, (x + em, y + 2.3 * em, x + w, y + h), dark, em)
         elif kind == 1:
-            _paste(image, picture_rand(rng, int(h - 60), int(w - 20)), x + 10, y + 46)
+            _paste(image, picture_rand(rng, int(h - 2.8 * em), int(w - em)), x + em / 2, y + 2.3 * em)
         else:
             for _ in range(int(rng.integers(2, 6))):
-                t = np.linspace(x + 20, x + w - 20, 120)
-                curve = y + 60 + (h - 80) * (0.5 + 0.4 * np.tanh(np.cumsum(rng.normal(size=120)) / 8))
+                t = np.linspace(x + em, x + w - em, 120)
+                curve = y + 3 * em + (h - 4 * em) * (0.5 + 0.4 * np.tanh(np.cumsum(rng.normal(size=120)) / 8))
                 line = np.c_[t, curve].ravel().tolist()
-                draw.line(line, fill=_colour(hue_rand(rng, 0.8, 0.9)), width=int(rng.integers(2, 6)))
+                tone = _colour(hue_rand(rng, 0.8, 0.9))
+                draw.line(line, fill=tone, width=max(1, round(em * rng.uniform(0.1, 0.3))))
     layers = pictured(averaged(image))
     return layers._replace(roughness=0.12, height=0.5)
 
 
 def _program(
-    rng: np.random.Generator, image: Image.Image, box: tuple[float, float, float, float], dark: bool
+    rng: np.random.Generator,
+    draw: ImageDraw.ImageDraw,
+    box: tuple[float, float, float, float],
+    dark: bool,
+    em: float,
 ) -> None:
-    draw = ImageDraw.Draw(image)
-    points = int(rng.integers(14, 26))
+    """Indented lines of words in five colours, as tall as 0.7 to 1.3 em."""
+    points = max(6, int(em * rng.uniform(0.7, 1.3)))
     face = font_rand(rng, "latin", points)
     tones = [_colour(hue_rand(rng, 0.6, 0.9 if dark else 0.45)) for _ in range(5)]
     y = box[1]

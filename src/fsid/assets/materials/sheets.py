@@ -123,7 +123,7 @@ def resolution_chart(rng: np.random.Generator, variant: int, size: int) -> Layer
     for _ in range((50, 80, 120, 160)[variant]):
         x, y = rng.uniform(0.02, 0.77, 2) * wide
         reach = wide * rng.uniform(0.04, 0.14)
-        draw.rectangle((x - 6, y - 6, x + 1.5 * reach, y + 1.1 * reach), fill=0)
+        draw.rectangle((x - 0.003 * wide, y - 0.003 * wide, x + 1.5 * reach, y + 1.1 * reach), fill=0)
         kind = int(rng.integers(4))
         if kind == 0:
             for k in range(10):
@@ -149,7 +149,9 @@ def resolution_chart(rng: np.random.Generator, variant: int, size: int) -> Layer
                 r = reach / 2 * 0.85**k
                 c = (x + reach / 2, y + reach / 2)
                 draw.ellipse((c[0] - r, c[1] - r, c[0] + r, c[1] + r), fill=255 * ((k + 1) % 2))
-        draw.text((x, y + reach), f"{rng.uniform(0.5, 20):.1f}", font=font_rand(rng, "digits", 20), fill=255)
+        draw.text(
+            (x, y + reach), f"{rng.uniform(0.5, 20):.1f}", font=font_rand(rng, "digits", size // 50), fill=255
+        )
     u, v = axes(size)
     steps = np.floor(7.999 * np.abs(2 * u - 1)) / 7 * (np.abs(v - 0.5) < 0.04)
     return _sheet(rng, size, averaged(image), steps)
