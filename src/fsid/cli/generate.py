@@ -53,8 +53,9 @@ def generate(
         width: Width of a frame in pixels (default 1920).
         height: Height of a frame in pixels (default 1080).
         variant: What varies between scenes: objects, materials, both, or everything (default full).
+        task: What the pairs are for (default denoise). super-resolution: KEY.noisy.dng has half the width and
+            height (--set scale=4: a quarter), KEY.degraded.dng is the same without noise.
         images: Folder of photographs, or of linear .exr renders of any engine, to take instead
-            of scenes; frames are random windows of at most WIDTH x HEIGHT pixels.
             of scenes; frames are random windows of at most WIDTH x HEIGHT pixels.
         workers: Number of processes (of the whole cluster with --ray); the result does not depend on it.
         ray: Address of a Ray cluster to work on: auto, ray://HOST:10001, or local to start one here.

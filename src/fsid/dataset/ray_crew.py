@@ -7,10 +7,14 @@ cluster's machines need the same FSID installed and the dataset's folder under t
 from __future__ import annotations
 
 import logging
+import socket
 from typing import Any
 
 from fsid.dataset.crew import Lost, MakeWork, do_task
 from fsid.errors import FsidError
+
+
+_PATIENCE_S = 5.0
 
 
 class _Member:
@@ -35,6 +39,7 @@ class RayCrew:
     def __init__(self, address: str, size: int, make_work: MakeWork, workers_per_gpu: int = 0) -> None:
         import ray
 
+        _check_reachable(address)
         self._ray, self._size, self._make_work = ray, size, make_work
         self._owns = not ray.is_initialized()
         try:
@@ -81,3 +86,16 @@ class RayCrew:
             self._ray.kill(member)
         if self._owns:
             self._ray.shutdown()
+
+
+def _check_reachable(address: str) -> None:
+    """FsidError where nobody listens at HOST:PORT; Ray itself would wait for minutes."""
+    host, _, port = address.removeprefix("ray://").rpartition(":")
+    if not port.isdecimal():
+        return
+    try:
+        socket.create_connection((host, int(port)), _PATIENCE_S).close()
+    except OSError as error:
+        raise FsidError(
+            f"--ray {address}: no Ray cluster answers there ({error.strerror or error})"
+        ) from None

@@ -1,0 +1,79 @@
+"""The same crew on a Ray cluster: the same bytes, and a lost actor costs its shard alone."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+pytest.importorskip("ray")
+
+from fsid.dataset import GenerateConfig, Workforce, generate
+from fsid.errors import FsidError
+
+
+def parents(pid: int) -> list[int]:
+    chain = []
+    while pid > 1:
+        stat = Path(f"/proc/{pid}/stat").read_text()
+        pid = int(stat.rpartition(")")[2].split()[1])
+        chain.append(pid)
+    return chain
+
+
+def actors() -> list[int]:
+    """Process ids of the Ray actors that this process started and that are at work."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*"):
+        try:
+            at_work = b"ray::_Member.do" in (path / "cmdline").read_bytes()
+            if at_work and os.getpid() in parents(int(path.name)):
+                found.append(int(path.name))
+        except OSError:
+            continue
+    return found
+
+
+def kill_two(out: Path, killed: list[int]) -> None:
+    deadline = time.monotonic() + 60
+    while len(killed) < 2 and time.monotonic() < deadline:
+        time.sleep(0.02)
+        fresh = [pid for pid in actors() if pid not in killed]
+        if list(out.glob("shard-*.tar")) and fresh:
+            os.kill(fresh[0], signal.SIGKILL)
+            killed.append(fresh[0])
+
+
+@pytest.mark.filterwarnings("ignore")  # Ray's own
+def test_lost_actors_change_nothing(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    for i in range(3):
+        Image.fromarray(rng.integers(0, 255, (400, 400, 3), np.uint8)).save(tmp_path / f"{i}.png")
+    config = GenerateConfig(images=str(tmp_path), width=384, height=384)
+    calm, out = tmp_path / "calm", tmp_path / "out"
+    generate(calm, config, count=48, shard_size=4)
+    killed: list[int] = []
+    lines: list[str] = []
+    killer = threading.Thread(target=kill_two, args=(out, killed))
+    killer.start()
+    force = Workforce(workers=2, ray="local")
+    assert generate(out, config, count=48, shard_size=4, workforce=force, lost=lines.append) == 48
+    killer.join()
+    assert len(killed) == len(lines) == 2
+    assert {p.name: p.read_bytes() for p in out.glob("*.tar")} == {
+        p.name: p.read_bytes() for p in calm.glob("*.tar")
+    }
+    assert not list(out.glob(".*.part"))
+
+
+def test_a_cluster_that_does_not_answer_is_one_line(tmp_path: Path) -> None:
+    with pytest.raises(FsidError, match=r"--ray 127\.0\.0\.1:1: no Ray cluster answers there"):
+        generate(
+            tmp_path, GenerateConfig(width=32, height=32), count=1, workforce=Workforce(ray="127.0.0.1:1")
+        )
