@@ -1,31 +1,94 @@
 """One image tells its noise, within the error that it states; what shows no noise is refused."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from PIL import Image
 
 from fsid.errors import FsidError
-from fsid.sensor import Raw, clean_from_photo, estimate_noise, load_profile, noisy_from_clean
+from fsid.sensor import (
+    CFA_PATTERNS,
+    NoiseLevel,
+    Raw,
+    clean_from_photo,
+    estimate_noise,
+    load_profile,
+    noisy_from_clean,
+)
 
 PROFILE = load_profile("pixel6")
 
 
-def photo() -> np.ndarray:
+def photo(name: str = "coffee") -> np.ndarray:
     from skimage import data
 
-    return data.coffee().astype(np.float32) / 255
+    return getattr(data, name)().astype(np.float32) / 255
 
 
-@pytest.mark.parametrize("iso", [1600, 6400])
-def test_the_noise_of_a_photo_is_found(iso, rng):
-    clean, level = clean_from_photo(rng, photo(), PROFILE), PROFILE.level(iso)
+def scene(mosaic: np.ndarray, cfa: str = "RGGB") -> Raw:
+    return Raw(mosaic.astype(np.float32), cfa, 64, 1023, (2.0, 1.0, 1.5), np.eye(3))
+
+
+def ramp(height: int = 256, width: int = 256) -> np.ndarray:
+    return np.tile(np.linspace(0.0, 0.8, width), (height, 1))
+
+
+@pytest.mark.parametrize(("name", "iso"), [("coffee", 1600), ("coffee", 6400), ("astronaut", 3200)])
+def test_the_noise_of_a_photo_is_found(name, iso, rng):
+    clean, level = clean_from_photo(rng, photo(name), PROFILE), PROFILE.level(iso)
     found = estimate_noise(noisy_from_clean(rng, clean, iso, level))
     np.testing.assert_allclose(found.level.k, level.k, rtol=0.15)
     assert np.all(np.abs(np.array(found.level.k) - level.k) < 4 * np.array(found.k_error))
     assert np.all(np.abs(np.array(found.level.sigma2) - level.sigma2) < 4 * np.array(found.sigma2_error))
 
 
+@pytest.mark.parametrize("cfa", CFA_PATTERNS)
+def test_sites_that_differ_are_told_apart(cfa):
+    """Without texture the estimate is unbiased, and its scatter is below the stated error."""
+    level, found = NoiseLevel((2e-3, 2.2e-3, 2.4e-3, 2.6e-3), (2e-5, 3e-5, 2e-5, 4e-5)), []
+    for seed in range(5):
+        noisy = noisy_from_clean(np.random.default_rng(seed), scene(ramp(384, 384), cfa), 800, level)
+        estimate = estimate_noise(noisy)
+        found.append([estimate.level.k, estimate.level.sigma2])
+        for name in ("k", "sigma2"):
+            error = np.array(getattr(estimate.level, name)) - getattr(level, name)
+            assert np.all(np.abs(error) < 3 * np.array(getattr(estimate, f"{name}_error")))
+    k, sigma2 = np.mean(found, axis=0)
+    np.testing.assert_allclose(k, level.k, rtol=0.06)
+    assert np.corrcoef(k, level.k)[0, 1] > 0.8
+    assert sigma2.mean() == pytest.approx(np.mean(level.sigma2), rel=0.3)
+
+
+def test_the_temporal_noise_of_a_real_sensor_is_found(shared_data):
+    """Strips of 25 exposures of EMVA 1288 set 001, whose pattern is faint beside its noise."""
+    images = shared_data / "emva1288" / "001" / "images"
+    if not images.is_dir():
+        pytest.skip(f"{images}: no EMVA 1288 reference set here")
+    flats = [np.asarray(Image.open(path), float) for path in sorted(images.glob("b_[0-9]*_001.png"))]
+    black = np.asarray(Image.open(min(images.glob("d_0*"))), float).mean()
+    strips = np.concatenate([flat[:64] for flat in flats if flat.mean() < 0.7 * 4095])
+    found = estimate_noise(replace(scene((strips - black) / (4095 - black)), white_level=4095))
+    assert np.mean(found.level.k) * (4095 - black) == pytest.approx(0.28006, rel=0.1)
+    assert np.sqrt(np.mean(found.level.sigma2)) * (4095 - black) == pytest.approx(3.0731, rel=0.15)
+
+
 @pytest.mark.parametrize("shape", [(2, 2), (16, 16), (4, 400)])
 def test_a_small_image_is_refused(shape, rng):
-    raw = Raw(rng.random(shape, np.float32) / 2, "RGGB", 64, 1023, (1, 1, 1), np.eye(3))
     with pytest.raises(FsidError, match="too small"):
-        estimate_noise(raw)
+        estimate_noise(scene(rng.random(shape) / 2))
+
+
+@pytest.mark.parametrize(
+    ("mosaic", "words"),
+    [
+        (np.ones((256, 256)), "saturated"),
+        (np.full((256, 256), 0.3), "no noise"),
+        (ramp(), "no smooth part"),
+        (np.full((256, 256), np.nan), "saturated"),
+    ],
+)
+def test_an_image_without_noise_is_refused(mosaic, words):
+    with pytest.raises(FsidError, match=words) as caught:
+        estimate_noise(scene(mosaic))
+    assert "\n" not in str(caught.value)

@@ -10,7 +10,8 @@ noise is known better after each round. Blocks of like mean are pooled by their 
 line count less than those below it: texture that was missed only ever adds.
 
 A picture rarely shows every colour in every light, so a site that says little is drawn to the mean of all
-four, from which the sites of published phones differ by `SITE_SPREAD`.
+four, from which the sites of published phones differ by `SITE_SPREAD`. Where hardly any block is smooth, the
+smoothest are taken. Texture as fine and random as noise (grain, gravel, grass) cannot be told from it.
 """
 
 from __future__ import annotations
@@ -40,6 +41,7 @@ _FIRST_SHARE = 0.05  # of the blocks, the smoothest ones, from which the first l
 _ROUNDS = 8
 _SMOOTH_QUANTILE = 0.5
 _REWEIGHTINGS = 12
+_TEXTURE = 0.08  # of a variance: error that texture makes in an ordinary photograph (bench/blind_noise.py)
 
 
 @dataclass(frozen=True)
@@ -73,12 +75,8 @@ class _Pools:
     freedom: np.ndarray
 
 
-def _frequencies() -> tuple[np.ndarray, np.ndarray]:
-    order = np.add.outer(np.arange(_SIDE), np.arange(_SIDE))
-    return (order > 0) & (order < _SIDE - 1), order >= _SIDE
-
-
-_LOW, _HIGH = _frequencies()
+_ORDER = np.add.outer(np.arange(_SIDE), np.arange(_SIDE))
+_LOW, _HIGH = (_ORDER > 0) & (_ORDER < _SIDE), _ORDER >= _SIDE + 2
 _LOW_LIMIT = chi2.ppf(_SMOOTH_QUANTILE, _LOW.sum()) / _LOW.sum()
 _HIGH_MEDIAN = chi2.median(_HIGH.sum()) / _HIGH.sum()
 _MEDIAN_EFFICIENCY = 2 / np.pi  # of the median against the mean
@@ -98,7 +96,15 @@ def estimate_noise(raw: Raw) -> NoiseEstimate:
         raise FsidError("the image is too small, or saturated almost everywhere, to tell its noise")
     line = _first_line(together, floor)
     for _ in range(_ROUNDS):
-        line, errors = _line(_pools(together, line), floor)
+        pools = _pools(together, line)
+        line, errors = _line(pools, floor)
+    if line[0] == 0 and line[1] <= floor:
+        raise FsidError("the image holds no noise beyond its rounding; there is nothing to measure")
+    if np.all(errors > line):
+        raise FsidError("the image does not tell its noise: too few smooth parts, or all of one brightness")
+    errors = np.hypot(
+        errors, _TEXTURE * np.array([line[0], line[0] * pools.mean.clip(min=0).min() + line[1]])
+    )
     sites = [_site_line(_pools(site, line), line, errors, floor) for site in blocks]
     (k, sigma2), (k_error, sigma2_error) = np.transpose(sites, (1, 2, 0))
     return NoiseEstimate(NoiseLevel(_four(k), _four(sigma2)), _four(k_error), _four(sigma2_error))
@@ -131,7 +137,7 @@ def _first_line(blocks: _Blocks, floor: float) -> np.ndarray:
     chosen = np.concatenate(
         [part[np.argsort(blocks.low[part])[: max(3, int(_FIRST_SHARE * part.size))]] for part in parts]
     )
-    mean, variance = blocks.mean[chosen].clip(min=0), blocks.high[chosen]
+    mean, variance = blocks.mean[chosen].clip(min=0), np.maximum(blocks.high[chosen], floor)
     scale = 1 / np.maximum(variance, np.median(variance) / 4)
     design = np.stack([mean, np.ones_like(mean)], axis=1)
     line, _ = nnls(design * scale[:, None], variance * scale)
@@ -159,7 +165,7 @@ def _line(pools: _Pools, floor: float) -> tuple[np.ndarray, np.ndarray]:
     if pools.mean.size < 2:
         raise FsidError("the image has no smooth part in which its noise could be seen")
     design = np.stack([pools.mean.clip(min=0), np.ones_like(pools.mean)], axis=1)
-    model = pools.variance
+    model = np.maximum(pools.variance, floor)
     weight = np.ones_like(model)
     for _ in range(_REWEIGHTINGS):
         root = np.sqrt(weight * pools.freedom / 2) / model
