@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,8 +22,8 @@ from scipy.ndimage import uniform_filter
 
 from fsid.assets import MaterialMaps
 from fsid.render import Renderer
-from fsid.render.drawable import Drawable, View, background_drawable
-from fsid.scene.model import Background, Camera, Light, Material, Transform
+from fsid.render.drawable import Drawable, View, background_drawable, panel_drawable
+from fsid.scene.model import Background, Camera, Distortion, Light, Material, Motion, Sky, Transform
 from render_scenes import bake_plain, block, grid, plain, point_light, sphere
 
 GOLDEN = Path(__file__).parent / "golden"
@@ -30,6 +31,7 @@ OUTPUT = Path(__file__).resolve().parents[1] / "test-output"
 MEAN_TOLERANCE, PEAK_TOLERANCE = 0.005, 0.08
 CAMERA = Camera((0.1, -2.0, 1.3), (0.0, 0.0, 0.35), (0.05, 0.0, 1.0), 52.0, 160, 90)
 NAMES = ("floor", "ceiling", "wall_north", "wall_south", "wall_east", "wall_west")
+ONE = (1.0, 1.0, 1.0)
 WARM, COOL, DARK = (0.7, 0.35, 0.15), (0.2, 0.35, 0.7), (0.06, 0.06, 0.05)
 
 
@@ -111,7 +113,98 @@ def soft_shadows() -> View:
     return room_view(lights, 0.03, *posts, lid)
 
 
-SCENES = {"furniture": (furniture, 1.6), "metals": (metals, 1.6), "soft_shadows": (soft_shadows, 2.2)}
+def ball(material: Material, number: int, x: float, y: float = 0.0) -> Drawable:
+    return thing(sphere(0.22, 64), material, number, x, y, 0.22)
+
+
+def lobes() -> View:
+    """Lacquer, velvet, glass, a lamp, and a sheet of paper with a light behind it."""
+    red = plain((0.5, 0.03, 0.02), roughness=60)
+    sheet = Drawable(
+        grid(0.5),
+        Transform((0.1, 0.55, 0.55), (90.0, 0.0, 0.0), ONE),
+        (replace(plain((0.7, 0.7, 0.6)), translucency=0.5),),
+        9,
+    )
+    return room_view(
+        (point_light((-0.9, -0.9, 1.8), 2.5, 0.06), point_light((0.1, 1.0, 0.6), 0.5, 0.05)),
+        0.1,
+        ball(replace(red, clearcoat=1.0), 0, -0.75),
+        ball(replace(plain((0.05, 0.03, 0.2)), sheen=1.0), 1, -0.25, -0.1),
+        ball(replace(plain((0.9, 0.95, 0.9), roughness=20), transmission=1.0), 2, 0.25, -0.1),
+        ball(replace(plain(WARM), emission=2.0), 3, 0.8, 0.1),
+        sheet,
+    )
+
+
+def area_light() -> View:
+    panel = Light("area", (0.3, 0.5, 1.5), (-0.1, -0.4, -1.0), (6.0, 5.5, 5.0), 0.0, 360.0, (0.7, 0.4))
+    what = room_view(
+        (panel,),
+        0.03,
+        ball(plain((0.9, 0.7, 0.4), roughness=30, family="metal"), 0, -0.5),
+        thing(block((0.3, 0.3, 0.5)), plain(COOL, roughness=40), 1, 0.4, 0.1),
+    )
+    return replace(what, drawables=(*what.drawables, panel_drawable(panel, plain())))
+
+
+def open_air() -> View:
+    ground = Background("open-air", (60.0, 60.0, 2.0), {"ground": patterned("checks", WARM, DARK, COOL)})
+    return View(
+        (
+            background_drawable(ground),
+            ball(plain((0.9, 0.9, 0.9), roughness=20, family="metal"), 0, -0.4),
+            thing(block((0.3, 0.3, 0.8)), plain(WARM), 1, 0.4, 0.2),
+        ),
+        (Light("sun", (0.0, 0.0, 0.0), (-0.6, 0.5, -0.7), (3.0, 2.8, 2.5), 0.0047, 360.0),),
+        (0.0, 0.0, 0.0),
+        replace(CAMERA, target_m=(0.0, 0.0, 0.6), fov_deg=75.0),
+        (60.0, 60.0, 2.0),
+        sky=Sky("procedural", (0.3, 0.4, 0.6), seed=3, cloudiness=0.6),
+    )
+
+
+def fisheye() -> View:
+    lens = Distortion("fisheye", (0.02, -0.01, 0.0, 0.0))
+    camera = replace(
+        CAMERA,
+        fov_deg=90.0,
+        position_m=(0.1, -1.1, 0.8),
+        distortion=lens,
+        vignetting=(-0.4, 0.0, 0.0),
+        chromatic_aberration=(0.006, -0.006),
+    )
+    return replace(furniture(), camera=camera)
+
+
+def blurred() -> View:
+    """The middle ball is sharp; the right one moves, and so does the camera a little."""
+    camera = replace(
+        CAMERA, aperture_m=0.04, focus_m=2.2, exposure_s=0.1, velocity_m_s=(0.05, 0.0, 0.0), time_s=0.5
+    )
+    what = room_view(
+        (point_light((-0.9, -0.9, 1.8), 3.0, 0.06),),
+        0.1,
+        ball(patterned("checks", WARM, COOL, DARK), 0, -0.5, -0.9),
+        ball(patterned("checks", WARM, COOL, DARK), 1, -0.1),
+        replace(
+            ball(plain(COOL, roughness=30), 2, 0.3),
+            motion=Motion(velocity_m_s=(1.2, 0.0, 0.0), spin_deg_s=(0.0, 0.0, 90.0)),
+        ),
+    )
+    return replace(what, camera=camera)
+
+
+SCENES = {
+    "furniture": (furniture, 1.6),
+    "metals": (metals, 1.6),
+    "soft_shadows": (soft_shadows, 2.2),
+    "lobes": (lobes, 1.2),
+    "area_light": (area_light, 0.8),
+    "open_air": (open_air, 0.6),
+    "fisheye": (fisheye, 1.6),
+    "blurred": (blurred, 1.6),
+}
 """name -> (view, exposure)."""
 
 

@@ -31,7 +31,7 @@ class Buffers:
         self._vertices = context.buffer(geometry.vertices.tobytes())
         self._indices = context.buffer(geometry.indices.tobytes())
         self._owned: list[Any] = [self._world, self._vertices, self._indices]
-        self._tables = {
+        self._tables: dict[str, Any] = {
             "surfaces": self._table(surface_texels(geometry.surfaces)),
             "lights": self._table(plan.table.view(np.float32).reshape(len(plan.table), -1, 4)),
             "room": self._room(room.radiance),
@@ -48,8 +48,10 @@ class Buffers:
     def vertex_array(self, program: moderngl.Program) -> moderngl.VertexArray:
         """The geometry as input of a program: positions in the world, and the rest where it is asked for."""
         content: list[tuple[Any, ...]] = [(self._world, "3f", "in_world")]
-        if "in_surface" in program:
+        if "in_normal" in program:
             content.append((self._vertices, "3f 1u", "in_normal", "in_surface"))
+        else:
+            content.append((self._vertices, "12x 1u", "in_surface"))
         array = self._context.vertex_array(program, content, self._indices)
         self._owned.append(array)
         return array

@@ -67,7 +67,7 @@ class Drawable:
 
     @property
     def is_glass(self) -> bool:
-        """Whether light passes through any part of it."""
+        """Whether any part of it is drawn as glass."""
         return any(material.transmission >= CLEAR for material in self.materials)
 
 

@@ -12,11 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from fsid.assets import Mesh
-from fsid.render.drawable import Drawable
+from fsid.render.drawable import CLEAR, Drawable
 from fsid.render.layers import Layer
 from fsid.scene.model import Material
 
 VERTEX = np.dtype([("normal", "3f4"), ("surface", "u4")])
+"""surface: its number in the table; the highest bit is set for glass."""
 
 SURFACE = np.dtype(
     [
@@ -39,7 +40,8 @@ SURFACE = np.dtype(
         ("emission", "f4"),
         ("transmission", "f4"),
         ("object_id", "f4"),
-        ("padding", "2f4"),
+        ("thickness_m", "f4"),
+        ("padding", "f4"),
     ]
 )
 """Ten texels of `struct Surface` in shaders/surfaces.glsl; object_id is one more than the frame's."""
@@ -73,7 +75,8 @@ def merge(drawables: Sequence[Drawable], layer_of: Callable[[Material], Layer], 
         positions, normals = _in_world(drawable, index, time_s)
         mesh_vertices = np.empty(len(positions), VERTEX)
         mesh_vertices["normal"] = normals
-        mesh_vertices["surface"] = mesh_surface + first_surface
+        clear = np.array([m.transmission >= CLEAR for m in drawable.materials], np.uint32)
+        mesh_vertices["surface"] = (mesh_surface + first_surface) | (clear[mesh_surface] << 31)
         vertices.append(mesh_vertices)
         world.append(positions)
         indices.append(faces + np.uint32(first_vertex))
@@ -172,8 +175,14 @@ def _surface(drawable: Drawable, material: Material, layer: Layer, time_s: float
     surface["emission"] = material.emission
     surface["transmission"] = material.transmission
     surface["object_id"] = drawable.object_id + 1
+    surface["thickness_m"] = (
+        _GLASS_SHARE * np.ptp(drawable.mesh.vertices, axis=0).min() * min(drawable.transform.scale)
+    )
     return surface
 
+
+_GLASS_SHARE = 0.3
+"""Thickness of glass relative to the smallest side of what it is a part of: most are hollow."""
 
 _SMOOTHEST = 0.18
 """MIN_ROUGHNESS in shaders/material.glsl: bounds the highlights of lights without size."""

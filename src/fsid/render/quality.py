@@ -14,7 +14,7 @@ import numpy as np
 class Quality:
     """search_taps, filter_taps: per shadow. occlusion_taps: per block. probes: per texture footprint.
 
-    shadow_px: edge of a shadow map's tile, texels.
+    shadow_px: edge of a shadow map's tile, texels. shots: at most so many images for one blurred image.
     """
 
     search_taps: int
@@ -22,11 +22,12 @@ class Quality:
     occlusion_taps: int
     probes: float
     shadow_px: int
+    shots: int
 
 
 QUALITIES = {
-    "high": Quality(search_taps=8, filter_taps=16, occlusion_taps=32, probes=4.0, shadow_px=1024),
-    "fast": Quality(search_taps=6, filter_taps=9, occlusion_taps=14, probes=2.0, shadow_px=512),
+    "high": Quality(search_taps=8, filter_taps=16, occlusion_taps=32, probes=4.0, shadow_px=1024, shots=64),
+    "fast": Quality(search_taps=6, filter_taps=9, occlusion_taps=14, probes=2.0, shadow_px=512, shots=24),
 }
 
 

@@ -12,7 +12,7 @@ what is resident (texture slots) are addressed by whole numbers, and everything 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from types import TracebackType
 from typing import Any, ClassVar, Self
 
@@ -22,9 +22,11 @@ import numpy as np
 from fsid.assets import bake_material
 from fsid.errors import FsidError
 from fsid.render.buffers import Buffers
-from fsid.render.camera import NEAR_M, Lens, lens_of
+from fsid.render.camera import NEAR_M, lens_of
 from fsid.render.context import GlInfo, gl_info, open_context
 from fsid.render.drawable import BACKGROUND_ID, Drawable, View, view_of
+from fsid.render.exposure import Shot, shots_of
+from fsid.render.flow import flow_between
 from fsid.render.frame import Frame
 from fsid.render.geometry import Geometry, draw_commands, in_view, merge
 from fsid.render.lamps import lamps_of
@@ -40,26 +42,6 @@ from fsid.scene.model import Material, Scene
 
 Mark = Callable[[str], None]
 """Called with the name of each stage when it has been issued; the benchmark measures with it."""
-
-
-@dataclass(frozen=True)
-class _Shot:
-    """One pass over a view. shift: of the G-buffer, half image sizes; shift_px: of the image, pixels.
-
-    lens_offset: shift of the rays by the place on the lens, normalised coordinates.
-    """
-
-    lens: Lens
-    time_s: float
-    shift_px: tuple[float, float] = (0.0, 0.0)
-    lens_offset: tuple[float, float] = (0.0, 0.0)
-
-    @property
-    def seen_shift(self) -> tuple[float, float]:
-        """Shift of the G-buffer that keeps its samples on those of the image, half image sizes."""
-        (x, y), focal, size = self.shift_px, self.lens.seen_focal, self.lens.seen_px
-        a, b = self.lens_offset
-        return (2 * x / size[0] + a * focal[0], 2 * y / size[1] - b * focal[1])
 
 
 class Renderer:
@@ -110,7 +92,7 @@ class Renderer:
         self._block_depth = load_program(context, "screen.vert", "block_depth.frag")
         self._occlusion = load_program(context, "screen.vert", "occlusion.frag")
         self._blur = load_program(context, "screen.vert", "blur.frag")
-        self._shades: dict[int, moderngl.Program] = {}
+        self._shades: dict[tuple[int, bool, bool], moderngl.Program] = {}
         self._targets = Targets(context, self._grid)
         self._atlas = ShadowAtlas(context)
         taps = tap_table(self._quality)
@@ -118,6 +100,11 @@ class Renderer:
         self._taps.filter = (moderngl.NEAREST, moderngl.NEAREST)
         for program in (self._block_depth, self._occlusion):
             _set(program, stride=2 * self._grid, taps=self._quality.occlusion_taps)
+
+    @property
+    def _label_sample(self) -> float:
+        """Place in the pixel, along both axes, of the sample that the labels belong to."""
+        return (self._grid // 2 + 0.5) / self._grid
 
     @property
     def info(self) -> GlInfo:
@@ -138,14 +125,28 @@ class Renderer:
     ) -> None:
         self.close()
 
-    def render(self, scene: Scene, camera_index: int = 0) -> Frame:
-        """The frame of one of the scene's cameras.
+    def render(self, scene: Scene, camera_index: int = 0, flow_to: int | None = None) -> Frame:
+        """The frame of one of the scene's cameras; with the optical flow to another one.
 
         radiance and albedo are the mean of a pixel's samples. depth, normal and object_id are those of one of
         them, the sample (s // 2, s // 2) of the s x s grid, so the three agree in every pixel.
         Raises FsidError for a scene that cannot be drawn.
         """
-        return self.draw(view_of(scene, camera_index))
+        view = view_of(scene, camera_index)
+        frame = self.draw(view)
+        if flow_to is None:
+            return frame
+        if not 0 <= flow_to < len(scene.cameras):
+            raise FsidError(f"flow_to {flow_to}: the scene has {len(scene.cameras)} cameras")
+        here, there = view.camera, scene.cameras[flow_to]
+        flow = flow_between(
+            frame,
+            view.drawables,
+            (here, lens_of(here), here.time_s),
+            (there, lens_of(there), there.time_s),
+            self._label_sample,
+        )
+        return replace(frame, flow=flow)
 
     def draw(
         self,
@@ -162,17 +163,24 @@ class Renderer:
         if Renderer._active is not self:
             raise FsidError("this Renderer is closed")
         camera = view.camera
-        shot = _Shot(lens_of(camera), camera.time_s, shift_px)
+        shot = Shot(lens_of(camera), camera.time_s, shift_px)
         self._draw(view, shot, bake, mark)
         frame = self._targets.read_frame()
         mark("readback")
-        return frame
+        shots = shots_of(camera, view.drawables, frame, shot, self._label_sample, self._quality.shots)
+        if not shots:
+            return frame
+        total = np.zeros_like(frame.radiance)
+        for part in shots:
+            self._draw(view, part, bake, mark)
+            total += self._targets.read_radiance()[..., :3]
+        return replace(frame, radiance=total / np.float32(len(shots)))
 
     def wait(self) -> None:
         """Return when everything issued so far is done; only measuring needs it."""
         self._context.finish()
 
-    def _draw(self, view: View, shot: _Shot, bake: Bake, mark: Mark) -> None:
+    def _draw(self, view: View, shot: Shot, bake: Bake, mark: Mark) -> None:
         """One pass over a view; the result stays in the targets."""
         layers = self._layers.load([(m.family, m.variant) for d in view.drawables for m in d.materials], bake)
 
@@ -182,7 +190,7 @@ class Renderer:
         geometry = merge(view.drawables, lambda m: layers[m.family, m.variant], shot.time_s)
         sources = [Source(light) for light in view.lights]
         sources += lamps_of(view.drawables, albedo_of, shot.time_s)
-        casts = np.array([drawable.casts and not drawable.is_glass for drawable in view.drawables])
+        casts = np.array([drawable.casts for drawable in view.drawables])
         movable = np.array([_shades_outdoors(drawable, view) for drawable in view.drawables])
         plan = plan_shadows(
             sources, geometry.spheres[casts & movable], geometry.spheres, self._quality.shadow_px
@@ -198,11 +206,14 @@ class Renderer:
             mark("upload")
             self._draw_shadows(geometry, plan, buffers, casts)
             mark("shadows")
-            self._draw_samples(geometry, shot, buffers)
+            self._draw_samples(geometry, shot, buffers, glass=False)
             mark("samples")
             self._draw_occlusion(shot, buffers)
             mark("occlusion")
-            self._shade(view, shot, plan, room, sky, buffers)
+            self._shade(view, shot, plan, room, sky, buffers, glass=False)
+            if any(drawable.is_glass for drawable in view.drawables):
+                self._draw_samples(geometry, shot, buffers, glass=True)
+                self._shade(view, shot, plan, room, sky, buffers, glass=True)
             self._context.finish()
             mark("shading")
         finally:
@@ -230,7 +241,7 @@ class Renderer:
         buffers.draw_screen(self._moments)
         self._atlas.end_moments()
 
-    def _draw_samples(self, geometry: Geometry, shot: _Shot, buffers: Buffers) -> None:
+    def _draw_samples(self, geometry: Geometry, shot: Shot, buffers: Buffers, *, glass: bool) -> None:
         lens, shift = shot.lens, shot.seen_shift
         tangents = tuple((1 + abs(s)) / f for s, f in zip(shift, lens.seen_focal, strict=True))
         seen = np.flatnonzero(
@@ -243,10 +254,11 @@ class Renderer:
         focal = (lens.seen_focal[0], -lens.seen_focal[1])
         _set(self._visible, origin=lens.position, axes=lens.rotation.T, focal=focal, shift=shift, near=NEAR_M)
         self._context.enable_only(moderngl.DEPTH_TEST)
-        self._targets.begin_samples()
+        _set(self._visible, layer=int(glass))
+        self._targets.begin_samples(over=glass)
         buffers.draw(buffers.vertex_array(self._visible), commands)
 
-    def _draw_occlusion(self, shot: _Shot, buffers: Buffers) -> None:
+    def _draw_occlusion(self, shot: Shot, buffers: Buffers) -> None:
         self._context.enable_only(moderngl.NOTHING)
         self._targets.begin_block_depth()
         buffers.draw_screen(self._block_depth)
@@ -269,16 +281,18 @@ class Renderer:
     def _shade(
         self,
         view: View,
-        shot: _Shot,
+        shot: Shot,
         plan: ShadowPlan,
         room: Room,
         sky: np.ndarray | None,
         buffers: Buffers,
+        *,
+        glass: bool,
     ) -> None:
         lens, camera = shot.lens, view.camera
         pixel_rad = 2.0 / (lens.focal[0] * camera.width)
         level = -1.0 if sky is None else max(float(np.log2(pixel_rad * len(sky) / np.pi)), 0.0)
-        program = self._shade_program(lens.model)
+        program = self._shade_program(lens.model, _has_lobes(view), glass)
         _set(
             program,
             grid=self._grid,
@@ -306,7 +320,7 @@ class Renderer:
             vignetting=camera.vignetting,
             magnification=1.0,
         )
-        self._targets.begin_shading()
+        self._targets.begin_shading(over=glass)
         self._layers.use(0, 1)
         self._atlas.use(compare_unit=2, moments_unit=3)
         self._taps.use(7)
@@ -317,12 +331,26 @@ class Renderer:
             _set(program, magnification=1.0 + aberration)
             buffers.draw_screen(program)
 
-    def _shade_program(self, lens_model: int) -> moderngl.Program:
-        if lens_model not in self._shades:
-            self._shades[lens_model] = load_program(
-                self._context, "screen.vert", "shade.frag", LENS=lens_model
+    def _shade_program(self, lens_model: int, lobes: bool, glass: bool) -> moderngl.Program:
+        key = (lens_model, lobes, glass)
+        if key not in self._shades:
+            self._shades[key] = load_program(
+                self._context,
+                "screen.vert",
+                "shade.frag",
+                LENS=lens_model,
+                LOBES=int(lobes),
+                GLASS=int(glass),
             )
-        return self._shades[lens_model]
+        return self._shades[key]
+
+
+def _has_lobes(view: View) -> bool:
+    return any(
+        max(m.clearcoat, m.sheen, m.translucency) > 0
+        for drawable in view.drawables
+        for m in drawable.materials
+    )
 
 
 def _colour_passes(red: float, blue: float) -> list[tuple[float, tuple[bool, bool, bool]]]:
@@ -357,5 +385,7 @@ def _set(program: moderngl.Program, **values: Any) -> None:
         if isinstance(uniform, moderngl.Uniform):
             if isinstance(value, np.ndarray):
                 uniform.write(value.astype("f4").tobytes())
+            elif isinstance(value, tuple) and uniform.array_length > 1:
+                uniform.value = value[: uniform.array_length]
             else:
                 uniform.value = value

@@ -20,6 +20,8 @@ class Targets:
         self._context = context
         self._grid = grid
         self._owned: list[Any] = []
+        self._results: list[list[Any]] = []
+        self._final = 0
         self.size = self.seen = (0, 0)
 
     def resize(self, size: tuple[int, int], seen: tuple[int, int]) -> None:
@@ -33,6 +35,7 @@ class Targets:
                     f"image size {width} x {height}: this driver draws 1 .. {limit} pixels a side"
                 )
         self.release()
+        self.size, self.seen = size, seen
         context, large = self._context, (seen[0] * self._grid, seen[1] * self._grid)
         self.blocks = (-(-seen[0] // 2), -(-seen[1] // 2))
         self._samples = context.texture(large, 4, dtype="u4")
@@ -40,31 +43,23 @@ class Targets:
         self._depth.compare_func = ""
         self._block_depth = context.texture(self.blocks, 1, dtype="f4")
         self._open, self._blurred = (context.texture(self.blocks, 2, dtype="f4") for _ in range(2))
-        self._radiance = context.texture(size, 4, dtype="f4")
-        self._labels = [context.texture(size, 4, dtype="nu2") for _ in range(2)]
+        self._results = [self._result()]
         images = [self._samples, self._depth, self._block_depth, self._open, self._blurred]
-        images += [self._radiance, *self._labels]
         for texture in images:
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._to_samples = context.framebuffer([self._samples], self._depth)
         self._to_block_depth = context.framebuffer([self._block_depth])
         self._to_open = context.framebuffer([self._open])
         self._to_blurred = context.framebuffer([self._blurred])
-        self._to_result: Any = context.framebuffer([self._radiance, *self._labels])
-        framebuffers = [
-            self._to_samples,
-            self._to_block_depth,
-            self._to_open,
-            self._to_blurred,
-            self._to_result,
-        ]
+        framebuffers = [self._to_samples, self._to_block_depth, self._to_open, self._to_blurred]
         self._owned = [*framebuffers, *images]
-        self.size, self.seen = size, seen
 
-    def begin_samples(self) -> None:
-        """Draw the G-buffer, from nothing."""
+    def begin_samples(self, *, over: bool) -> None:
+        """Draw the G-buffer, from nothing; or only what lies in front of the depth that is there."""
         self._to_samples.use()
+        self._to_samples.depth_mask = not over
         self._to_samples.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
+        self._to_samples.depth_mask = True
 
     def begin_block_depth(self) -> None:
         """Draw the depth of the blocks; unit 0 holds the G-buffer."""
@@ -82,26 +77,36 @@ class Targets:
         (self._blurred if back else self._open).use(0)
         (self._to_open if back else self._to_blurred).use()
 
-    def begin_shading(self) -> None:
-        """Draw the result; units 8, 9 hold the G-buffer and the occlusion."""
+    def begin_shading(self, *, over: bool) -> None:
+        """Draw the result; units 8, 9 hold the G-buffer and the occlusion; units 11 to 13, with `over`, the
+        result so far, and what is drawn becomes the result."""
         self._samples.use(8)
         self._open.use(9)
-        self._to_result.use()
+        if over:
+            if len(self._results) == 1:
+                self._results.append(self._result())
+            for unit, texture in zip((11, 12, 13), self._results[0][1:], strict=True):
+                texture.use(unit)
+        self._final = 1 if over else 0
+        self._results[self._final][0].use()
 
     def mask(self, red: bool, green: bool, blue: bool) -> None:
         """Let the next draws write some colours only; depth and labels go with green."""
-        self._to_result.color_mask = ((red, green, blue, green), (green,) * 4, (green,) * 4)
+        self._results[self._final][0].color_mask = ((red, green, blue, green), (green,) * 4, (green,) * 4)
 
     def read_radiance(self) -> np.ndarray:
         """(H, W, 4): radiance and depth (0: nothing hit), row 0 at the top. A view of what was read."""
         width, height = self.size
-        return np.frombuffer(self._radiance.read(), np.float32).reshape(height, width, 4)
+        return np.frombuffer(self._results[self._final][1].read(), np.float32).reshape(height, width, 4)
 
     def read_frame(self) -> Frame:
         """The result, row 0 at the top."""
         width, height = self.size
         radiance = self.read_radiance()
-        albedo, normal = (np.frombuffer(t.read(), np.uint16).reshape(height, width, 4) for t in self._labels)
+        albedo, normal = (
+            np.frombuffer(t.read(), np.uint16).reshape(height, width, 4)
+            for t in self._results[self._final][2:]
+        )
         depth = radiance[..., 3]
         return Frame(
             radiance=np.ascontiguousarray(radiance[..., :3]),
@@ -113,9 +118,18 @@ class Targets:
 
     def release(self) -> None:
         """Free the images."""
-        for item in self._owned:
+        for item in [*self._owned, *(part for result in self._results for part in result)]:
             item.release()
-        self._owned = []
+        self._owned, self._results = [], []
+
+    def _result(self) -> list[Any]:
+        """A framebuffer and its images: radiance and depth; albedo and object id; normal."""
+        radiance = self._context.texture(self.size, 4, dtype="f4")
+        labels = [self._context.texture(self.size, 4, dtype="nu2") for _ in range(2)]
+        radiance.repeat_x = radiance.repeat_y = False
+        for label in labels:
+            label.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        return [self._context.framebuffer([radiance, *labels]), radiance, *labels]
 
 
 class ShadowAtlas:

@@ -50,7 +50,19 @@ vec3 ray_at(vec2 pixel) {
     return vec3(vec2(p.x, -p.y) - lens_offset, 1.0);
 }
 
+// Where the image shows a point (x right, y up, z forward), in its pixels; distortion aside.
+vec2 pixel_of(vec3 local) {
+    vec2 p = local.xy / max(local.z, 1e-3) + lens_offset;
+    return (vec2(p.x, -p.y) * focal * 0.5 + 0.5) * vec2(size) + shift;
+}
+
 // Where the G-buffer sees a ray, in its pixels.
 vec2 seen_at(vec3 ray) {
     return ((vec2(ray.x, -ray.y) * seen_focal + seen_shift) * 0.5 + 0.5) * vec2(seen);
+}
+
+// The ray through a point of the G-buffer, in its pixels.
+vec3 seen_ray(vec2 pixel) {
+    vec2 p = (pixel / vec2(seen) * 2.0 - 1.0 - seen_shift) / seen_focal;
+    return vec3(p.x, -p.y, 1.0);
 }

@@ -51,6 +51,7 @@ struct Receiver {
     float texel, tile_size;   // of the depth; tile units
     mat2 spread;           // how far the light's half axes move a shadow, per difference of u; tile units
     float search;          // radius of what may shade it, tile units
+    bool inside;           // the tile; beyond the sun's nothing casts shadows
 };
 
 Receiver receiver_of(Light light, vec3 d, vec3 n) {
@@ -79,6 +80,7 @@ Receiver receiver_of(Light light, vec3 d, vec3 n) {
     r.bias = sun ? BIAS_M / light.range_m : BIAS_M * r.u * r.u / SHADOW_NEAR;
     r.tile_size = 2.0 / light.focal;
     r.texel = r.tile_size / tile_px;
+    r.inside = !sun || max(abs(at.x), abs(at.y)) < 0.5 * r.tile_size;
     r.to_atlas = tile_px / (atlas * r.tile_size);
     r.corner = vec2(tile % tile_columns, tile / tile_columns) * tile_px / atlas;
     r.centre = r.corner + r.to_atlas * (0.5 * r.tile_size + at);
@@ -126,7 +128,7 @@ bool alone(Receiver r, float width) {
 float visibility(Light light, vec3 position, vec3 face_normal, bool wanted) {
     Receiver r = receiver_of(light, position - light.position, face_normal);
     float shaded = 0.0, blocked_sum = 0.0, blocked;
-    int taps = wanted && !alone(r, 1.2 * r.search) ? search_taps : 0;
+    int taps = wanted && r.inside && !alone(r, 1.2 * r.search) ? search_taps : 0;
     mat2 search = r.spread * (r.search / max(max(length(r.spread[0]), length(r.spread[1])), 1e-12));
     float width = 0.3 * r.search;
     for (int i = 0; i < taps; ++i) {

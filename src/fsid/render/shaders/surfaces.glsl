@@ -14,6 +14,7 @@ struct Surface {
     vec3 glow;          // radiance of its own in front, whatever its albedo
     float emission;     // radiance per albedo
     int object_id;      // one more than in the frame
+    float thickness_m;  // of glass
 };
 
 Surface surface_at(int i) {
@@ -40,5 +41,6 @@ Surface surface_at(int i) {
     s.emission = t[8].w;
     s.transmission = t[9].x;
     s.object_id = int(t[9].y);
+    s.thickness_m = t[9].z;
     return s;
 }

@@ -1,0 +1,95 @@
+"""What a shutter and a lens opening gather: the mean of sharp images at fixed times and places on the lens.
+
+    radiance = 1 / N sum_i image(t_i, lens place_i)
+
+The times are evenly spaced and the places lie on a spiral, alike for every pixel: no noise. N follows the
+widest blur in the image, so that neighbouring images are at most STEP_PX apart, up to a limit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fsid.render.camera import Lens, lens_of
+from fsid.render.drawable import UNMOVED, Drawable
+from fsid.render.flow import flow_between
+from fsid.render.frame import Frame
+from fsid.render.quality import spiral
+from fsid.scene.model import ZERO, Camera
+
+STEP_PX = 1.5
+_FEWEST = 4
+
+
+@dataclass(frozen=True)
+class Shot:
+    """One sharp image. shift_px: of the image. lens_offset: of the rays, place on the lens / focus_m."""
+
+    lens: Lens
+    time_s: float
+    shift_px: tuple[float, float] = (0.0, 0.0)
+    lens_offset: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def seen_shift(self) -> tuple[float, float]:
+        """Shift of the G-buffer that keeps its samples on those of the image, half image sizes."""
+        (x, y), focal, size = self.shift_px, self.lens.seen_focal, self.lens.seen_px
+        a, b = self.lens_offset
+        return (2 * x / size[0] + a * focal[0], 2 * y / size[1] - b * focal[1])
+
+
+def shots_of(
+    camera: Camera,
+    drawables: Sequence[Drawable],
+    frame: Frame,
+    middle: Shot,
+    sample: float,
+    most: int,
+) -> list[Shot]:
+    """The images to average; none where the camera's image is sharp. frame: that of the shot `middle`."""
+    moving = camera.exposure_s > 0 and (
+        camera.velocity_m_s != ZERO
+        or camera.spin_deg_s != ZERO
+        or any(drawable.motion != UNMOVED for drawable in drawables)
+    )
+    count = 0
+    if moving:
+        count = max(count, round(_motion_px(camera, drawables, frame, sample) / STEP_PX) + 1)
+    if camera.aperture_m > 0:
+        across = _blur_px(camera, middle.lens, frame) / STEP_PX
+        count = max(count, round(np.pi / 4 * across * across) + 1)
+    if count == 0:
+        return []
+    count = int(np.clip(count, _FEWEST, most))
+    places = spiral(count) * camera.aperture_m / 2
+    order = np.argsort((np.arange(count) * 0.6180339887) % 1.0, kind="stable")
+    shots = []
+    for i, (right, up) in enumerate(places[order]):
+        since = ((i + 0.5) / count - 0.5) * camera.exposure_s if moving else 0.0
+        lens = lens_of(camera, camera.time_s + since)
+        offset = (float(right / camera.focus_m), float(up / camera.focus_m))
+        position = lens.position + right * lens.rotation[0] + up * lens.rotation[1]
+        moved = Lens(lens.rotation, position, lens.focal, lens.seen_px, lens.seen_focal, lens.model, lens.k)
+        shots.append(Shot(moved, camera.time_s + since, middle.shift_px, offset))
+    return shots
+
+
+def _motion_px(camera: Camera, drawables: Sequence[Drawable], frame: Frame, sample: float) -> float:
+    """How far the fastest thing in the image moves during the exposure."""
+    start, end = (camera.time_s + side * camera.exposure_s / 2 for side in (-1, 1))
+    middle = (camera, lens_of(camera), camera.time_s)
+    paths = [
+        flow_between(frame, drawables, middle, (camera, lens_of(camera, time), time), sample)
+        for time in (start, end)
+    ]
+    length = np.linalg.norm(paths[1] - paths[0], axis=-1)
+    return float(np.nanquantile(length, 0.999)) if np.isfinite(length).any() else 0.0
+
+
+def _blur_px(camera: Camera, lens: Lens, frame: Frame) -> float:
+    """Diameter of the widest circle of confusion, pixels."""
+    nearness = np.abs(1 / camera.focus_m - 1 / frame.depth.astype(float))
+    return float(np.quantile(nearness, 0.999) * camera.aperture_m * lens.focal[0] * camera.width / 2)
