@@ -26,16 +26,20 @@ _NATURAL_SHARES = (0.34, 0.22, 0.18, 0.16, 0.10)
 class Mood(NamedTuple):
     """What the colours of one scene share, as those of one photograph do.
 
-    hue_deg: CIELAB hue that the harmonised palette keeps to. chroma: factor on all chromas but lab's.
+    hue_deg: CIELAB hue that the harmonised palette keeps to. hues_deg: two or three of the natural hues.
+    chroma: factor on all chromas but lab's.
     """
 
     hue_deg: float
+    hues_deg: tuple[float, ...]
     chroma: float
 
 
 def mood_rand(rng: np.random.Generator) -> Mood:
     """A hue, and how colourful the scene is: most are muted, some vivid."""
-    return Mood(float(rng.uniform(0, 360)), float(np.exp(rng.normal(-0.15, 0.45))))
+    hue_deg, count = float(rng.uniform(0, 360)), int(rng.integers(2, 4))
+    hues_deg = rng.choice(_NATURAL_HUES_DEG, 3, replace=False, p=_NATURAL_SHARES) + rng.normal(0, 10, 3)
+    return Mood(hue_deg, tuple(hues_deg[:count].tolist()), float(np.exp(rng.normal(-0.4, 0.5))))
 
 
 def lab_to_rgb(lab: np.ndarray) -> np.ndarray:
@@ -84,7 +88,7 @@ def lab_rand(rng: np.random.Generator, palette: str, mood: Mood) -> np.ndarray:
     elif palette == "harmonised":
         hue, chroma = mood.hue_deg + rng.normal(0, 14), rng.gamma(2.2, 7.0)
     else:
-        hue = rng.choice(_NATURAL_HUES_DEG, p=_NATURAL_SHARES) + rng.normal(0, 14)
+        hue = mood.hues_deg[int(rng.integers(len(mood.hues_deg)))] + rng.normal(0, 12)
         chroma = rng.gamma(2.0, 6.5)
     return np.array([level, *_polar(chroma * mood.chroma, hue)])
 

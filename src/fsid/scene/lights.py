@@ -26,8 +26,8 @@ KINDS = ("point", "spot", "area")
 
 SUN_TANGENT = 0.0047
 _LUMINANCE = np.array((0.2126, 0.7152, 0.0722))
-_LEAST_PRIMARY = 0.1
-"""No camera amplifies a colour that is hardly there (blue by candle light) more than tenfold."""
+_LEAST_PRIMARY = 0.05
+"""Candle light has no blue within sRGB: this much is left, for the camera to amplify."""
 _NEAR_VIEW_DEG = 40.0
 """An area light nearer than this to the line from focus to camera changes sides, not to block the view."""
 
@@ -119,10 +119,11 @@ def _lamp_rand(
 def _lamp_colour_rand(rng: np.random.Generator, config: LightConfig) -> np.ndarray:
     """(3,) linear colour of luminance 1: a black body, or a coloured LED."""
     rgb = blackbody_rgb(_temperature_rand(rng, config.temperature_k))
-    tinted, tint = rng.random() < config.tinted_share, rng.uniform(0.1, 1.0, 3)
+    tinted, tint = rng.random() < config.tinted_share, rng.uniform(0.2, 1.0, 3)
     if tinted:
-        rgb = rgb * tint / (rgb * tint @ _LUMINANCE)
-    return rgb
+        rgb = rgb * tint
+    rgb = np.maximum(rgb, _LEAST_PRIMARY * rgb.max())
+    return rgb / (rgb @ _LUMINANCE)
 
 
 def _temperature_rand(rng: np.random.Generator, limits_k: tuple[float, float]) -> float:
@@ -171,7 +172,7 @@ def _adapted(
 ) -> Lighting:
     """The lighting with its mean colour moved towards white, at the same mean luminance."""
     mean = np.pi * ambient + sum((_irradiance(light, focus_m) for light in lights), np.zeros(3))
-    gains = np.maximum(mean / (mean @ _LUMINANCE), _LEAST_PRIMARY) ** -adaptation
+    gains = (mean / (mean @ _LUMINANCE)) ** -adaptation
     gains *= (mean @ _LUMINANCE) / (mean * gains @ _LUMINANCE)
     return Lighting(
         lights=tuple(replace(light, colour=vec3(light.colour * gains)) for light in lights),

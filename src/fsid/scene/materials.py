@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -16,6 +17,7 @@ from fsid.assets import (
 from fsid.scene.choice import log_uniform_rand, pick_rand
 from fsid.scene.colour import PALETTES, Mood, albedo_rgb, lab_rand, related_rand
 from fsid.scene.config import SceneConfig
+from fsid.scene.knobs import Range
 from fsid.scene.lobes import lobes_rand
 from fsid.scene.model import Material, Vec3
 from fsid.scene.pools import OFTEN_PLAIN, POOLS
@@ -39,7 +41,9 @@ PLAIN = Material(
 def material_rand(rng: np.random.Generator, config: SceneConfig, mood: Mood, part_name: str) -> Material:
     """The material of an object's part; its name may say what it is made of (`fsid.assets.part_kind`)."""
     plain, family = rng.random() < config.materials.plain_share, texture_rand(rng, config)
-    material = _finished_rand(rng, config, mood, PLAIN_FAMILY if plain else family)
+    material = _finished_rand(
+        rng, config, mood, PLAIN_FAMILY if plain else family, config.materials.tile_scale
+    )
     return lobes_rand(rng, config.materials, material, part_name)
 
 
@@ -52,10 +56,15 @@ def surface_rand(rng: np.random.Generator, config: SceneConfig, mood: Mood, surf
     common = pick_rand(rng, pool)
     if rng.random() < config.background.pool_share and not family.startswith(FILE):
         family = common
-    return _finished_rand(rng, config, mood, PLAIN_FAMILY if plain else family)
+    family = PLAIN_FAMILY if plain else family
+    material = _finished_rand(rng, config, mood, family, config.background.tile_scale)
+    aligned, quarter = rng.random() < config.background.aligned_share, int(rng.integers(4))
+    return replace(material, rotation_deg=90.0 * quarter) if aligned else material
 
 
-def _finished_rand(rng: np.random.Generator, config: SceneConfig, mood: Mood, family: str) -> Material:
+def _finished_rand(
+    rng: np.random.Generator, config: SceneConfig, mood: Mood, family: str, tile_scale: Range
+) -> Material:
     """`family` in random colours, size and relief."""
     knobs = config.materials
     variant = int(rng.integers(MATERIAL_VARIANTS))
@@ -66,7 +75,7 @@ def _finished_rand(rng: np.random.Generator, config: SceneConfig, mood: Mood, fa
         family=f"{family}+{layer}" if layered and family != PLAIN_FAMILY else family,
         variant=variant,
         colours=in_nature or colours,
-        tile_m=material_tile_m(family) * log_uniform_rand(rng, knobs.tile_scale),
+        tile_m=material_tile_m(family) * log_uniform_rand(rng, tile_scale),
         rotation_deg=float(rng.uniform(0, 360)),
         roughness_scale=float(rng.uniform(*knobs.roughness_scale)),
         relief_scale=float(rng.uniform(*knobs.relief_scale)),

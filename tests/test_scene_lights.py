@@ -1,0 +1,145 @@
+"""Laws of light and finish: adaptation, lobes by kind, and files in place of families."""
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fsid.assets import PART_KINDS
+from fsid.errors import FsidError
+from fsid.scene import BackgroundConfig, LightConfig, MaterialConfig, SceneConfig, sample
+from fsid.scene.lobes import EMISSION, LOBES, lobes_rand
+from fsid.scene.materials import PLAIN
+from fsid.scene.sources import sky_rand
+
+ROOM = BackgroundConfig(kind_shares=(1.0, 0.0, 0.0, 0.0))
+OUTSIDE = BackgroundConfig(kind_shares=(0.0, 0.0, 0.0, 1.0))
+
+
+def scene(seed=0, **groups):
+    config = SceneConfig(objects=(1, 1), mesh_families=("toy_blocks",), **groups)
+    return sample(config, seed, width=96, height=64)
+
+
+def mean_colour(s):
+    focus = np.array((0.0, 0.0, 0.35))
+    total = np.pi * np.array(s.ambient)
+    for light in s.lights:
+        gap = 1.0 if light.kind == "sun" else float(np.sum((np.array(light.position_m) - focus) ** 2))
+        area = np.prod(light.size_m) if light.kind == "area" else 1.0
+        total = total + np.array(light.colour) * area / gap
+    return total / (total @ (0.2126, 0.7152, 0.0722))
+
+
+@pytest.mark.parametrize("background", [ROOM, OUTSIDE])
+def test_full_adaptation_makes_the_mean_light_white_and_none_leaves_it(background):
+    for seed in range(6):
+        white = scene(seed, background=background, lights=LightConfig(adaptation=(1.0, 1.0)))
+        np.testing.assert_allclose(mean_colour(white), 1, atol=0.12)
+    candle = LightConfig(adaptation=(0.0, 0.0), temperature_k=(2000.0, 2000.0), tinted_share=0.0)
+    red, _, blue = mean_colour(scene(0, background=ROOM, lights=candle))
+    assert red > 3 * blue
+
+
+def test_mixed_light_stays_mixed():
+    """The camera removes the common colour, not the contrast of warm and cool lamps."""
+    lights = LightConfig(count=(4, 4), adaptation=(1.0, 1.0), tinted_share=0.0)
+    ratios = []
+    for seed in range(6):
+        colours = np.array([light.colour for light in scene(seed, background=ROOM, lights=lights).lights])
+        ratios.append(np.ptp(np.log(colours[:, 0] / colours[:, 2])))
+    assert np.median(ratios) > 0.5
+
+
+def test_the_sun_is_above_and_the_sky_is_there():
+    seen = [scene(seed, background=OUTSIDE, lights=LightConfig(night_share=0.2)) for seed in range(24)]
+    kinds = [tuple(light.kind for light in s.lights) for s in seen]
+    assert ("sun",) in kinds
+    assert () in kinds
+    assert any("point" in kind or "spot" in kind for kind in kinds)
+    for s in seen:
+        assert min(s.sky.colour) > 0
+        assert s.ambient == s.sky.colour
+        for light in s.lights:
+            assert light.kind != "sun" or light.direction[2] < 0
+
+
+def test_every_lobe_belongs_to_a_kind_of_part():
+    assert set(LOBES) | set(EMISSION) <= set(PART_KINDS)
+    fields = {field.name for field in dataclasses.fields(PLAIN)}
+    assert {name for lobes in LOBES.values() for name in lobes} <= fields
+
+
+@pytest.mark.parametrize("kind", LOBES)
+def test_a_part_has_the_lobes_of_its_kind(kind):
+    rng = np.random.default_rng(0)
+    always = MaterialConfig(lobe_share=1.0, coat_share=1.0, emission_share=0.0)
+    for _ in range(20):
+        material = lobes_rand(rng, always, PLAIN, f"{kind}_of_the_test")
+        for name, (low, high) in LOBES[kind].items():
+            assert low <= getattr(material, name) <= high
+        others = {"clearcoat", "sheen", "translucency", "transmission", "emission"} - set(LOBES[kind])
+        assert not any(getattr(material, name) for name in others)
+    never = MaterialConfig(lobe_share=0.0, coat_share=0.0, emission_share=0.0)
+    assert lobes_rand(rng, never, PLAIN, kind) == PLAIN
+
+
+def test_lamps_and_screens_are_lit_in_the_configured_share():
+    rng = np.random.default_rng(0)
+    half = MaterialConfig(emission_share=0.5)
+    for kind, (low, high) in EMISSION.items():
+        found = np.array([lobes_rand(rng, half, PLAIN, kind).emission for _ in range(200)])
+        assert 0.35 < (found > 0).mean() < 0.65
+        assert ((found == 0) | ((found >= low) & (found <= high))).all()
+
+
+def test_skies_come_from_a_folder(tmp_path: Path):
+    for name in ("dawn.hdr", "noon.exr", "notes.txt"):
+        (tmp_path / name).touch()
+    config = SceneConfig(hdri_folder=str(tmp_path), hdri_share=1.0)
+    rng = np.random.default_rng(0)
+    found = {sky_rand(rng, config) for _ in range(30)}
+    assert found == {f"file:{tmp_path / name}" for name in ("dawn.hdr", "noon.exr")}
+    assert sky_rand(rng, SceneConfig()) == "procedural"
+
+
+@pytest.mark.parametrize("name", ["absent", "empty"])
+def test_a_folder_without_skies_names_itself(tmp_path: Path, name):
+    (tmp_path / "empty").mkdir()
+    config = SceneConfig(hdri_folder=str(tmp_path / name))
+    with pytest.raises(FsidError, match=name):
+        sky_rand(np.random.default_rng(0), config)
+
+
+def test_meshes_and_textures_come_from_folders_wherever_these_lie(tmp_path: Path):
+    """Objects and materials of the configured share are files, chosen by their names inside the folder."""
+    from PIL import Image
+
+    for place in ("here", "there"):
+        for name in ("one", "two"):
+            folder = tmp_path / place / name
+            folder.mkdir(parents=True)
+            Image.new("RGB", (64, 64), (120, 90, 60)).save(folder / f"{name}_Color.png")
+            (folder / f"{name}.obj").write_text(_TETRAHEDRON)
+    drawn = {}
+    for place in ("here", "there"):
+        folders = (str(tmp_path / place),)
+        config = SceneConfig(
+            objects=(8, 8),
+            mesh_families=("toy_blocks",),
+            mesh_folders=folders,
+            mesh_folder_share=0.6,
+            texture_folders=folders,
+            materials=MaterialConfig(layer_share=0.0),
+        )
+        s = sample(config, 5, width=96, height=64)
+        names = [o.family for o in s.objects] + [m.family for ms in s.materials for m in ms]
+        drawn[place] = [name.replace(str(tmp_path / place), "") for name in names]
+        assert any(name.startswith("file:") for name in names[:8])
+        assert "toy_blocks" in names[:8]
+        assert any(name.startswith("file:") for name in names[8:])
+    assert drawn["here"] == drawn["there"]
+
+
+_TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"

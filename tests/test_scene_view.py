@@ -1,0 +1,164 @@
+"""Laws of cameras: rigs, bursts, motion, and lenses that can be inverted."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fsid.errors import FsidError
+from fsid.scene import (
+    Camera,
+    CameraConfig,
+    Distortion,
+    LensConfig,
+    MotionConfig,
+    RigConfig,
+    SceneConfig,
+    sample,
+)
+from fsid.scene.lens import MAX_FISHEYE_DEG, check_distortion, corner_radius, lens_rand
+
+CAMERA = Camera((0.0, -2.0, 1.0), (0.0, 0.0, 0.3), (0.0, 0.0, 1.0), 60.0, 96, 64)
+
+
+def scene(seed=3, **groups):
+    config = SceneConfig(objects=(3, 3), mesh_families=("toy_blocks",), **groups)
+    return sample(config, seed, width=96, height=64)
+
+
+def axis(camera):
+    forward = np.subtract(camera.target_m, camera.position_m)
+    return forward / np.linalg.norm(forward)
+
+
+def test_a_stereo_pair_stands_a_baseline_apart_and_looks_the_same_way():
+    left, right = scene(rig=RigConfig(eyes=2, baseline_m=(0.06, 0.06))).cameras
+    step = np.subtract(right.position_m, left.position_m)
+    assert np.linalg.norm(step) == pytest.approx(0.06)
+    np.testing.assert_allclose(axis(left), axis(right), atol=1e-9)
+    assert step @ axis(left) == pytest.approx(0, abs=1e-9)
+    assert step @ left.up == pytest.approx(0, abs=1e-9)
+    assert (left.eye, right.eye) == (0, 1)
+
+
+def test_converging_eyes_look_at_one_point():
+    mono = scene().cameras[0]
+    cameras = scene(rig=RigConfig(eyes=5, convergence=1.0)).cameras
+    assert [camera.eye for camera in cameras] == list(range(5))
+    assert len({camera.target_m for camera in cameras}) == 1
+    np.testing.assert_allclose(cameras[2].position_m, mono.position_m)
+    np.testing.assert_allclose(cameras[2].target_m, mono.target_m)
+
+
+def test_a_burst_starts_with_the_single_picture_and_trembles_by_the_configured_amount():
+    """Standard deviations of position and angle over a long burst are those drawn from the knobs."""
+    knobs = MotionConfig(frames=400, interval_s=1 / 30, shake_deg=(0.2, 0.2), shake_m=(0.002, 0.002))
+    frames = scene(motion=knobs).cameras
+    first, single = frames[0], scene().cameras[0]
+    np.testing.assert_allclose(first.position_m, single.position_m, atol=1e-12)
+    np.testing.assert_allclose(axis(first), axis(single), atol=1e-12)
+    assert [camera.frame for camera in frames] == list(range(400))
+    assert [camera.time_s for camera in frames] == pytest.approx(np.arange(400) / 30)
+    spread = np.std([camera.position_m for camera in frames], axis=0)
+    np.testing.assert_allclose(spread, 0.002, rtol=0.35)
+    angles = np.degrees(np.arccos(np.clip([axis(c) @ axis(first) for c in frames], -1, 1)))
+    assert 0.05 < angles.mean() < 1.0
+
+
+def test_velocity_and_spin_are_the_derivatives_of_the_pose():
+    """Central differences of a finely sampled burst agree with what each frame states."""
+    knobs = MotionConfig(frames=9, interval_s=1e-3, exposure_s=(0.01, 0.01), shake_deg=(0.3, 0.3))
+    frames = scene(motion=knobs, rig=RigConfig(eyes=2)).cameras[9:]
+    for before, now, after in zip(frames, frames[1:], frames[2:], strict=False):
+        moved = np.subtract(after.position_m, before.position_m) / 2e-3
+        np.testing.assert_allclose(moved, now.velocity_m_s, atol=1e-3)
+        turned = (axis(after) - axis(before)) / 2e-3
+        np.testing.assert_allclose(turned, np.cross(np.radians(now.spin_deg_s), axis(now)), atol=1e-3)
+
+
+def test_a_still_camera_takes_no_time():
+    camera = scene().cameras[0]
+    assert (camera.exposure_s, camera.velocity_m_s, camera.spin_deg_s) == (0.0, (0, 0, 0), (0, 0, 0))
+    assert scene().motions == ()
+
+
+def test_objects_move_as_configured():
+    knobs = MotionConfig(frames=2, moving_share=0.5, speed_m_s=(0.1, 0.2), spin_deg_s=(5.0, 6.0))
+    config = SceneConfig(objects=(60, 60), mesh_families=("toy_blocks",), motion=knobs)
+    s = sample(config, 1, width=96, height=64)
+    speeds = np.linalg.norm([motion.velocity_m_s for motion in s.motions], axis=1)
+    spins = np.linalg.norm([motion.spin_deg_s for motion in s.motions], axis=1)
+    moving = speeds > 0
+    assert len(s.motions) == 60
+    assert 0.3 < moving.mean() < 0.7
+    assert ((speeds[moving] >= 0.1) & (speeds[moving] <= 0.2)).all()
+    assert ((spins[moving] >= 5) & (spins[moving] <= 6)).all()
+    assert (spins[~moving] == 0).all()
+
+
+def test_the_lens_changes_nothing_but_the_lens():
+    lens = LensConfig(distortion_share=1.0, blur_share=1.0, vignetting_share=1.0, fringe_share=1.0)
+    plain, seen = scene().cameras[0], scene(lens=lens).cameras[0]
+    assert seen.distortion is not None
+    assert seen.aperture_m > 0
+    assert -1 < sum(seen.vignetting) < 0
+    assert any(seen.chromatic_aberration)
+    fields = ("distortion", "aperture_m", "focus_m", "vignetting", "chromatic_aberration")
+    assert dataclasses.replace(seen, **{name: getattr(plain, name) for name in fields}) == plain
+
+
+@given(st.integers(0, 2**32), st.floats(5.0, 150.0), st.booleans())
+def test_every_drawn_distortion_can_be_inverted(seed, fov_deg, fisheye):
+    """Newton's method finds the undistorted point of the corner and of every radius before it."""
+    config = LensConfig(distortion_share=1.0, fisheye_share=float(fisheye), distortion=(-0.5, 0.5))
+    camera = dataclasses.replace(CAMERA, fov_deg=fov_deg)
+    camera = lens_rand(np.random.default_rng(seed), config, camera)
+    if camera.distortion is None:
+        assert not fisheye
+        return
+    corner = corner_radius(camera)
+    check_distortion(camera.distortion, corner)
+    wanted = np.linspace(0, corner, 50)
+    if fisheye:
+        k = camera.distortion.coefficients
+        at = np.linspace(0, np.radians(MAX_FISHEYE_DEG), 20001)
+    else:
+        k1, k2, _, _, k3 = camera.distortion.coefficients
+        k = (k1, k2, k3)
+        at = np.linspace(0, 4 * corner, 20001)
+    radius = at * (1 + sum(c * at ** (2 * i + 2) for i, c in enumerate(k)))
+    end = int(np.argmax(radius > corner))
+    assert end > 0
+    assert (np.diff(radius[: end + 1]) > 0).all()
+    found = np.interp(wanted, radius[: end + 1], at[: end + 1])
+    again = found * (1 + sum(c * found ** (2 * i + 2) for i, c in enumerate(k)))
+    np.testing.assert_allclose(again, wanted, atol=2e-4 * max(corner, 1))
+
+
+@pytest.mark.parametrize(
+    ("distortion", "message"),
+    [
+        (Distortion("brown-conrady", (-2.0, 0.0, 0.0, 0.0, 0.0)), "folds"),
+        (Distortion("fisheye", (-0.9, 0.0, 0.0, 0.0)), "folds"),
+        (Distortion("fisheye", (0.1,)), "4 coefficients"),
+        (Distortion("mirror", (0.1,)), "'mirror'"),
+    ],
+)
+def test_a_distortion_without_inverse_is_refused(distortion, message):
+    with pytest.raises(FsidError, match=message):
+        check_distortion(distortion, 0.7)
+
+
+def test_views_are_low_level_and_high():
+    """Walls and horizon are seen as well as the ground, and no low camera stands among the objects."""
+    elevations = []
+    for seed in range(60):
+        camera = scene(seed, camera=CameraConfig(distance_m=(0.5, 1.2))).cameras[0]
+        x, y, z = camera.position_m
+        elevations.append(np.degrees(np.arctan2(z - 0.35, np.hypot(x, y))))
+        if elevations[-1] < 10:
+            assert np.hypot(x, y) > 1.1
+    assert min(elevations) < 12
+    assert max(elevations) > 60
