@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from fsid.cli.main import COMMANDS, main
-from fsid.sensor import Raw, load_profile, noisy_from_clean, read_raw, to_dn
+from fsid.sensor import Raw, load_profile, noisy_from_clean, read_raw, to_dn, write_dng
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 GUIDES = (
@@ -23,6 +23,8 @@ GUIDES = (
     "train-and-denoise.md",
     "evaluate.md",
     "inspect.md",
+    "capture-a-test-set.md",
+    "experiments.md",
 )
 
 
@@ -37,6 +39,7 @@ def desk(tmp_path_factory: pytest.TempPathFactory, photos: Path) -> Path:
     folder = tmp_path_factory.mktemp("desk")
     shutil.copytree(photos, folder / "photographs")
     write_bursts(folder)
+    write_captures(folder / "captures")
     return folder
 
 
@@ -50,6 +53,19 @@ def write_bursts(folder: Path) -> None:
         for iso, number in product((800, 3200), range(count)):
             noisy = noisy_from_clean(rng, clean, iso, profile.level(iso))
             np.save(folder / kind / f"iso{iso}_{number:02d}.npy", to_dn(noisy))
+
+
+def write_captures(folder: Path) -> None:
+    """Bursts of six frames of a smooth picture at two light levels, as a phone would store them."""
+    rng, profile = np.random.default_rng(1), load_profile("pixel6")
+    x, y = np.meshgrid(np.arange(96), np.arange(64))
+    picture = (0.3 + 0.2 * np.sin(x / 9) * np.cos(y / 7)).astype(np.float32)
+    clean = Raw(picture, profile.cfa, profile.black_level, profile.white_level, (2.0, 1.0, 1.6), np.eye(3))
+    for level, iso in (("0.5lux", 3200), ("2lux", 800)):
+        (folder / "star" / level).mkdir(parents=True)
+        for number in range(6):
+            noisy = noisy_from_clean(rng, clean, iso, profile.level(iso))
+            write_dng(folder / "star" / level / f"{number:04d}.dng", noisy)
 
 
 def take_inputs_of_denoise(desk: Path) -> None:

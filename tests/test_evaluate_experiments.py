@@ -63,13 +63,6 @@ def test_synthetic_against_real_goes_on_where_it_was_stopped(photos: Path, tmp_p
     assert stop.value.code == 2
 
 
-def test_the_ablation_compares_the_four_variants(tmp_path: Path):
-    out = tmp_path / "ablation"
-    main(["experiment", "ablation", "-o", str(out), *SMOKE, "--seeds", "0"])
-    models = {row["model"] for row in json.loads((out / "results.json").read_text())}
-    assert {"objects-seed0", "materials-seed0", "objects-materials-seed0", "full-seed0"} <= models
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
