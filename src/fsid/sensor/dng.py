@@ -21,7 +21,8 @@ from fsid.errors import FsidError
 from fsid.files import write_atomically
 from fsid.sensor import dng_tags
 from fsid.sensor.colour import published_matrices
-from fsid.sensor.metadata import Metadata, kept_metadata, libraw_metadata
+from fsid.sensor.embedded import embedded_directories
+from fsid.sensor.metadata import Metadata, kept_metadata, libraw_metadata, taken
 from fsid.sensor.mosaic import CFA_PATTERNS, site_offsets
 from fsid.sensor.quantise import from_dn, to_dn
 from fsid.sensor.raw import Raw
@@ -88,8 +89,8 @@ def read_header(path: str | Path) -> RawHeader:
         return RawHeader(
             camera=dng_tags.camera_name(tags),
             iso=_iso(file, tags),
-            exposure_s=dng_tags.exposure_time_s(tags) or float(getattr(other, "shutter", 0.0)),
-            date=dng_tags.date_taken(tags),
+            exposure_s=dng_tags.exposure_time_s(tags) or float(getattr(other, "shutter_speed", 0.0)),
+            date=dng_tags.date_taken(tags) or taken(file)[:10].replace(":", "-"),
         )
 
 
@@ -135,7 +136,7 @@ def _dng_bytes(raw: Raw, preview: np.ndarray | None) -> bytes:
 
 @dataclass(frozen=True)
 class _Source:
-    """Tags of a TIFF-based RAW, those of the mosaic's own directory foremost; nothing for other formats."""
+    """Tags of a RAW that is a TIFF or carries one, those of the mosaic's own directory foremost."""
 
     values: dict[int, Values]
     metadata: Metadata | None
@@ -148,7 +149,7 @@ def _mosaic_directory(directories: list[dict[int, Tag]]) -> dict[int, Tag]:
 
 def _read_source(path: Path) -> _Source:
     with path.open("rb") as file:
-        directories = read_directories(file)
+        directories = read_directories(file) or embedded_directories(file)
     mosaic = _mosaic_directory(directories)
     size = path.stat().st_size
     for offsets, sizes in ((STRIP_OFFSETS, STRIP_SIZES), (TILE_OFFSETS, TILE_SIZES)):

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from fsid.sensor.metadata import COLOUR_MATRICES, EXPOSURE_TIME, ORIENTATION, merged
+from fsid.sensor.metadata import COLOUR_MATRICES, DATE_TAKEN, EXPOSURE_TIME, ORIENTATION, merged
 from fsid.sensor.raw import NoiseLevel, Raw
 from fsid.sensor.tiff import ASCII, BYTE, DOUBLE, LONG, RATIONAL, SHORT, SRATIONAL, Tag, Values, rationals
 
@@ -24,7 +24,7 @@ Tags = dict[int, Values]
 
 MAKE, MODEL = 271, 272
 CFA_REPEAT, CFA_PATTERN = 33421, 33422
-EXIF_ISO, DATE_TAKEN = 34855, 36867
+EXIF_ISO = 34855
 DNG_VERSION, DNG_BACKWARD_VERSION, UNIQUE_CAMERA_MODEL = 50706, 50707, 50708
 CFA_PLANE_COLOUR, CFA_LAYOUT, BLACK_LEVEL, WHITE_LEVEL = 50710, 50711, 50714, 50717
 COLOUR_MATRIX_1, COLOUR_MATRIX_2, AS_SHOT_NEUTRAL, PRIVATE_DATA = 50721, 50722, 50728, 50740
@@ -141,10 +141,11 @@ def d65_matrix(tags: Tags) -> np.ndarray | None:
 
 
 def camera_name(tags: Tags) -> str:
-    """UniqueCameraModel, else make and model, else "unknown"."""
-    return (
-        _text(tags, UNIQUE_CAMERA_MODEL) or f"{_text(tags, MAKE)} {_text(tags, MODEL)}".strip() or "unknown"
-    )
+    """UniqueCameraModel, else make and model ("Canon", "Canon EOS R5": once), else "unknown"."""
+    make, model = _text(tags, MAKE), _text(tags, MODEL)
+    brand = make.partition(" ")[0].lower()
+    told = model if brand and model.lower().startswith(brand) else f"{make} {model}".strip()
+    return _text(tags, UNIQUE_CAMERA_MODEL) or told or "unknown"
 
 
 def _private_data(raw: Raw) -> bytes:

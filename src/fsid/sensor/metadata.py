@@ -17,6 +17,7 @@ from typing import Any
 from fsid.sensor.tiff import ASCII, RATIONAL, SHORT, Tag, rationals
 
 ORIENTATION, EXPOSURE_TIME, F_NUMBER, FOCAL_LENGTH, LENS_MODEL = 274, 33434, 33437, 37386, 42036
+DATE_TAKEN = 36867
 CROP_ORIGIN, CROP_SIZE = 50719, 50720
 COLOUR_MATRICES = frozenset((50721, 50722, 50723, 50724, 50725, 50726, 50778, 50779, 50964, 50965))
 
@@ -72,12 +73,14 @@ def exposure_metadata(
     focal_length_mm: float = 0.0,
     lens: str = "",
     orientation: int = 1,
+    taken: str = "",
 ) -> Metadata:
-    """What is known of an exposure; 0 and "" where unknown."""
+    """What is known of an exposure; 0 and "" where unknown. taken: "2026:11:21 05:00:00"."""
     numbers = ((EXPOSURE_TIME, exposure_s), (F_NUMBER, f_number), (FOCAL_LENGTH, focal_length_mm))
     exif = [Tag(code, RATIONAL, rationals([value])) for code, value in numbers if value > 0]
-    if lens:
-        exif.append(Tag(LENS_MODEL, ASCII, lens.encode("ascii", "replace") + b"\0"))
+    for code, text in ((DATE_TAKEN, taken), (LENS_MODEL, lens)):
+        if text:
+            exif.append(Tag(code, ASCII, text.encode("ascii", "replace") + b"\0"))
     return Metadata((Tag(ORIENTATION, SHORT, (orientation,)),), (), tuple(exif))
 
 
@@ -85,19 +88,22 @@ def libraw_metadata(file: Any) -> Metadata:
     """What LibRaw says of a file that is no TIFF; a rawpy before 0.25 knows the orientation only."""
     other, lens = getattr(file, "other", None), getattr(file, "lens", None)
     return exposure_metadata(
-        exposure_s=float(getattr(other, "shutter", 0.0)),
+        exposure_s=float(getattr(other, "shutter_speed", 0.0)),
         f_number=float(getattr(other, "aperture", 0.0)),
-        focal_length_mm=float(getattr(other, "focal_len", 0.0)),
-        lens=_text(getattr(lens, "lens", "") or getattr(lens, "Lens", "")),
+        focal_length_mm=float(getattr(other, "focal_length", 0.0)),
+        lens=str(getattr(lens, "model", "")),
         orientation=_ORIENTATION_OF_FLIP.get(file.sizes.flip, 1),
+        taken=taken(file),
     )
+
+
+def taken(file: Any) -> str:
+    """When LibRaw says that the picture was taken, "2026:11:21 05:00:00"; "" where it does not know."""
+    timestamp = getattr(getattr(file, "other", None), "timestamp", None)
+    return f"{timestamp:%Y:%m:%d %H:%M:%S}" if timestamp is not None and timestamp.year > 1970 else ""
 
 
 def merged(own: Sequence[Tag], kept: Sequence[Tag]) -> tuple[Tag, ...]:
     """`own` tags, and those of `kept` with other codes."""
     codes = {tag.code for tag in own}
     return (*own, *(tag for tag in kept if tag.code not in codes))
-
-
-def _text(value: Any) -> str:
-    return value.decode("ascii", "replace") if isinstance(value, bytes) else str(value)

@@ -136,13 +136,17 @@ def rationals(values: Iterable[float]) -> tuple[int, ...]:
     return tuple(n for f in fractions for n in (f.numerator, f.denominator))
 
 
+# TIFF, and what Panasonic and Olympus write in the place of its 42.
+_BYTE_ORDERS = {b"II*\0": "<", b"MM\0*": ">", b"IIU\0": "<", b"IIRO": "<", b"IIRS": "<", b"MMOR": ">"}
+
+
 def read_directories(file: BinaryIO) -> list[dict[int, Tag]]:
     """The first directory of a TIFF, its EXIF directory and its sub-directories, as far as they are whole.
 
     [] where `file` is no TIFF. Tags by code; broken entries are left out.
     """
     header = file.read(_HEADER_SIZE)
-    order = {b"II*\0": "<", b"MM\0*": ">"}.get(header[:4])
+    order = _BYTE_ORDERS.get(header[:4])
     if order is None or len(header) < _HEADER_SIZE:
         return []
     size = file.seek(0, 2)
