@@ -13,7 +13,7 @@ from fsid.cli.progress import progress_bar
 from fsid.errors import FsidError
 
 if TYPE_CHECKING:
-    from fsid.denoise import MosaicLayout
+    from fsid.sensor import Layout
 
 
 def denoise(
@@ -92,11 +92,11 @@ def denoise(
 
 def _layout(
     cfa: str | None, black_level: int | None, white_level: int | None, width: int | None, height: int | None
-) -> MosaicLayout | None:
-    from fsid.denoise import MosaicLayout
+) -> Layout | None:
+    from fsid.sensor import Layout
 
     if cfa is None and black_level is None and white_level is None:
         return None
     if cfa is None or black_level is None or white_level is None:
         raise FsidError("a bare mosaic needs all three: --cfa, --black-level and --white-level")
-    return MosaicLayout(cfa, black_level, white_level, width, height)
+    return Layout(None, cfa, black_level, white_level, width, height)

@@ -14,7 +14,7 @@ from types import ModuleType
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 from fsid.denoise.denoise import Network, denoise_raw
-from fsid.denoise.files import MosaicLayout, Noise, denoise_file, denoise_folder, find_raws, noise_of
+from fsid.denoise.files import Noise, denoise_file, denoise_folder, find_raws, noise_of
 from fsid.denoise.interface import denoise as _denoise
 from fsid.denoise.interface import load_model
 from fsid.denoise.model import Denoiser, ModelCard, load_denoiser, save_model
@@ -25,7 +25,6 @@ from fsid.denoise.train_config import TrainConfig, train_config
 __all__ = [
     "Denoiser",
     "ModelCard",
-    "MosaicLayout",
     "Network",
     "NetworkConfig",
     "Noise",

@@ -13,12 +13,12 @@ from fsid.denoise.denoise import Network, denoise_raw
 from fsid.denoise.preview import preview_of
 from fsid.errors import FsidError
 from fsid.sensor import (
+    Layout,
     NoiseLevel,
     Raw,
     clean_levels,
     estimate_noise,
     load_profile,
-    read_mosaic,
     read_raw,
     write_dng,
 )
@@ -28,17 +28,6 @@ RAW_SUFFIXES = frozenset(
     """.3fr .arw .cr2 .cr3 .crw .dcr .dng .erf .fff .iiq .k25 .kdc .mef .mos .mrw .nef .nrw .orf .pef .raf
     .rw2 .rwl .sr2 .srf .srw""".split()  # noqa: SIM905  a list of them would take a page
 )
-
-
-@dataclass(frozen=True)
-class MosaicLayout:
-    """What a bare mosaic file does not say of itself. width, height: pixels; None where the file knows."""
-
-    cfa: str
-    black_level: int
-    white_level: int
-    width: int | None = None
-    height: int | None = None
 
 
 @dataclass(frozen=True)
@@ -59,17 +48,10 @@ def find_raws(folder: Path) -> list[Path]:
     return raws
 
 
-def read_input(path: Path, layout: MosaicLayout | None) -> Raw:
+def read_input(path: Path, layout: Layout | None) -> Raw:
     """Any Bayer file that LibRaw opens, or a bare mosaic with its `layout`. FsidError where unreadable."""
     if layout is not None:
-        return read_mosaic(
-            path,
-            cfa=layout.cfa,
-            black_level=layout.black_level,
-            white_level=layout.white_level,
-            width=layout.width,
-            height=layout.height,
-        )
+        return layout.read(path)
     if path.suffix.lower() in BARE_SUFFIXES:
         raise FsidError(
             f"{path}: is a bare mosaic, say what it holds: --cfa RGGB --black-level DN --white-level DN"
@@ -105,7 +87,7 @@ def denoise_file(
     profile: str | None = None,
     iso: float | None = None,
     strength: float = 1.0,
-    layout: MosaicLayout | None = None,
+    layout: Layout | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Noise:
     """Denoise one RAW file into a DNG with finer levels (a denoised value is no whole DN) and a preview.
@@ -131,7 +113,7 @@ def denoise_folder(
     profile: str | None = None,
     iso: float | None = None,
     strength: float = 1.0,
-    layout: MosaicLayout | None = None,
+    layout: Layout | None = None,
     progress: Callable[[int, int], None] | None = None,
     failed: Callable[[FsidError], None] = lambda error: None,
 ) -> None:

@@ -1,6 +1,6 @@
 """The camera: clean light to the RAW file that a named camera would have stored, and back to a picture."""
 
-from fsid.sensor.bare import read_mosaic
+from fsid.sensor.bare import Layout, read_mosaic
 from fsid.sensor.blind import NoiseEstimate, estimate_noise
 from fsid.sensor.calibrate import NoiseFit, fit_noise
 from fsid.sensor.camera_fit import Calibration, calibrate
@@ -10,7 +10,6 @@ from fsid.sensor.demosaic import demosaic
 from fsid.sensor.develop import develop, develop_linear, upright
 from fsid.sensor.dng import dng_pixel_offset, read_raw, write_dng
 from fsid.sensor.exposure import expose, exposure_rand
-from fsid.sensor.frames import Layout
 from fsid.sensor.light import LightLevel, dimmed, light_level
 from fsid.sensor.mosaic import bayer_crop, bayer_flip, mosaic, pack, unpack
 from fsid.sensor.noise import add_noise, level_rand, variance

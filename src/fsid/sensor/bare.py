@@ -10,6 +10,7 @@ The values are DN; `x = (DN - black_level) / (white_level - black_level)` as eve
 from __future__ import annotations
 
 import logging
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +28,32 @@ logging.getLogger("tifffile").setLevel(
     logging.CRITICAL
 )  # what is wrong with a file is said in one line, here
 BARE_SUFFIXES = (".raw", ".bin", ".npy", ".png", ".tif", ".tiff")
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What a bare mosaic does not say; None where it must be found. cfa "MONO" for no colour filters."""
+
+    iso: float | None = None
+    cfa: str | None = None
+    black_level: int | None = None
+    white_level: int | None = None
+    width: int | None = None
+    height: int | None = None
+
+    def read(self, path: Path) -> Raw:
+        """The Bayer mosaic at `path`; FsidError as `read_mosaic`, and where filters or levels are missing."""
+        if self.cfa is None or self.black_level is None or self.white_level is None:
+            raise FsidError(f"{path}: a bare mosaic needs its filter pattern, black level and white level")
+        return read_mosaic(
+            path,
+            cfa=self.cfa,
+            black_level=self.black_level,
+            white_level=self.white_level,
+            width=self.width,
+            height=self.height,
+            iso=self.iso or 0.0,
+        )
 
 
 def read_mosaic(

@@ -1,6 +1,6 @@
 """RAW files that are no TIFF but carry one: their EXIF.
 
-    CR3 (Canon):    ISO base media file;   moov / uuid / CMT1 is a TIFF with the camera, CMT2 with the exposure
+    CR3 (Canon):    ISO base media file;   moov / uuid / CMT1 is a TIFF on the camera, CMT2 on the exposure
     RAF (Fujifilm): at byte 84 the place and size of a JPEG, whose first APP1 segment is an Exif TIFF
 
 LibRaw tells exposure and lens of such files but not, through rawpy, who made the camera. The layouts are

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from fsid.errors import FsidError
-from fsid.sensor.bare import BARE_SUFFIXES, read_dn
+from fsid.sensor.bare import BARE_SUFFIXES, Layout, read_dn
 from fsid.sensor.dng import RawHeader, read_header, read_raw
 from fsid.sensor.mosaic import check_cfa
 from fsid.sensor.quantise import check_levels, to_dn
@@ -24,18 +24,6 @@ from fsid.sensor.quantise import check_levels, to_dn
 SAME_LIGHT = 0.03  # relative difference of the levels of two frames of one burst
 _ISO_IN_PATH = re.compile(r"iso[-_ ]?(\d+)", re.IGNORECASE)
 _SITES_DIFFER = 0.02  # of the level: a flat grey through colour filters differs by far more
-
-
-@dataclass(frozen=True)
-class Layout:
-    """What bare mosaics do not say; None where it must be found. cfa "MONO" for no colour filters."""
-
-    iso: float | None = None
-    cfa: str | None = None
-    black_level: int | None = None
-    white_level: int | None = None
-    width: int | None = None
-    height: int | None = None
 
 
 @dataclass(frozen=True)
