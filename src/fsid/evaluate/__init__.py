@@ -1,6 +1,7 @@
 """Metrics, test sets, comparisons and the report.
 
-`models` and `demo` need PyTorch and are imported by name; the rest runs without it.
+`experiments` and `demo` need PyTorch and are imported by name, `models` as soon as a model is named; the rest runs
+without it.
 """
 
 from fsid.evaluate.bursts import TruthQuality, burst_testset

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from fsid.denoise import denoise_raw, load_model
 from fsid.errors import FsidError
 from fsid.evaluate.compare import CLASSICAL, NOISY, Comparison, Method, compare, write_images, write_results
 from fsid.evaluate.report import comparison_sections, write_report
@@ -13,7 +12,9 @@ from fsid.evaluate.testset import read_testset
 
 
 def model_method(path: Path, name: str) -> Method:
-    """A trained model as a method; what it was trained on is in its card."""
+    """A trained model as a method; its card says what it was trained on. Needs PyTorch, as no baseline does."""
+    from fsid.denoise import denoise_raw, load_model
+
     model = load_model(path)
     return Method(name, model.card.training, lambda raw: denoise_raw(raw, model))
 
