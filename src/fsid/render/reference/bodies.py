@@ -1,4 +1,4 @@
-"""Objects and background of a scene as Mitsuba's meshes, shaded per vertex.
+"""Parts of a scene as Mitsuba's meshes, shaded per vertex.
 
 Every part is one mesh of micropolygons (`dicing`) with the attributes colour, roughness and metallic, and
 normals that carry the relief. Lobes, as far as Disney's model (Burley 2012, 2015) has them:
@@ -14,86 +14,24 @@ normals that carry the relief. Lobes, as far as Disney's model (Burley 2012, 201
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from fsid.assets import MaterialMaps, Mesh, build_background, build_mesh
-from fsid.assets.solids import rotation_matrix
-from fsid.errors import FsidError
-from fsid.render.reference.dicing import Surface, View, dice
+from fsid.assets import MaterialMaps
+from fsid.render.parts import Part, Surface
+from fsid.render.reference.dicing import View, dice
 from fsid.render.reference.footprint import footprints
 from fsid.render.reference.surface import Points, Pyramid, Shading, shade
-from fsid.scene.model import Material, Motion, Scene
+from fsid.scene.model import Material
 
 _DIELECTRIC = 0.04
 """Reflectance of index 1.5 at normal incidence; what it reflects does not reach the diffuse layer."""
 
 _OPEN_SHARE = 12.0
 """Footprint of what is not seen, in pixels at its distance: as much coarser as its micropolygons."""
-
-
-@dataclass(frozen=True)
-class Part:
-    """One part of one body: its triangles in metric space, and where that is in the world."""
-
-    surface: Surface
-    rotation: np.ndarray
-    position: np.ndarray
-    material: Material
-    object_id: int
-
-
-def parts_of(scene: Scene, time_s: float) -> Iterator[Part]:
-    """Background and objects, part by part, where they are at a time. Raises FsidError."""
-    background = scene.background
-    mesh = build_background(background.kind, background.size_m)
-    missing = [name for name in mesh.part_names if name not in background.materials]
-    if missing:
-        raise FsidError(f"scene.background.materials: '{missing[0]}' is missing")
-    materials = tuple(background.materials[name] for name in mesh.part_names)
-    yield from _parts(mesh, np.ones(3), np.eye(3), np.zeros(3), materials, -1)
-    motions = scene.motions or (Motion(),) * len(scene.objects)
-    for i, (S, M, T, motion) in enumerate(
-        zip(scene.objects, scene.materials, scene.transforms, motions, strict=True)
-    ):
-        mesh = build_mesh(S.family, S.seed)
-        if len(M) != len(mesh.part_names):
-            raise FsidError(
-                f"scene.materials[{i}]: {len(M)} materials, but '{S.family}' has {len(mesh.part_names)} parts"
-            )
-        rotation = turn(np.array(motion.spin_deg_s) * time_s) @ rotation_matrix(*T.rotation_deg)
-        place = np.array(T.position_m) + np.array(motion.velocity_m_s) * time_s
-        yield from _parts(mesh, np.array(T.scale), rotation, place, M, i)
-
-
-def _parts(
-    mesh: Mesh,
-    scale: np.ndarray,
-    rotation: np.ndarray,
-    position: np.ndarray,
-    materials: tuple[Material, ...],
-    object_id: int,
-) -> Iterator[Part]:
-    normals = mesh.normals / scale
-    normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
-    for number, material in enumerate(materials):
-        used, corners = np.unique(mesh.faces[mesh.face_parts == number], return_inverse=True)
-        if len(used):
-            surface = Surface(mesh.vertices[used] * scale, normals[used], corners.reshape(-1, 3))
-            yield Part(surface, rotation, position, material, object_id)
-
-
-def turn(degrees: np.ndarray) -> np.ndarray:
-    """(3, 3) rotation by |degrees| about the axis of `degrees` (Rodrigues)."""
-    angle = np.radians(np.linalg.norm(degrees))
-    if angle == 0:
-        return np.eye(3)
-    x, y, z = degrees / np.linalg.norm(degrees)
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
 
 
 Bsdfs = Callable[[frozenset[str]], Any]

@@ -14,6 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fsid.render.parts import Surface
+
 NEAR_M = 0.02
 MAX_VERTICES = 12_000_000
 _MAX_LEVELS = 24
@@ -43,15 +45,6 @@ class View:
         inside = np.abs(local[:, :2]) * (self.focal_px / depth)[:, None] < self.half_px + np.c_[margin_px]
         facing = ((self.position - points) * normals).sum(1) > -0.1 * np.linalg.norm(local, axis=1)
         return inside.all(1) & (local[:, 2] > 0) & facing
-
-
-@dataclass(frozen=True)
-class Surface:
-    """vertices: (V, 3) world, metres. normals: (V, 3) unit, world. faces: (F, 3) int."""
-
-    vertices: np.ndarray
-    normals: np.ndarray
-    faces: np.ndarray
 
 
 def dice(surface: Surface, view: View) -> Surface:

@@ -20,7 +20,8 @@ from fsid.assets import bake_material
 from fsid.errors import FsidError
 from fsid.render.camera import Lens, lens_of
 from fsid.render.frame import Frame
-from fsid.render.reference.bodies import Body, body_of, bsdf_of, parts_of, pyramids, turn
+from fsid.render.parts import parts_of, turn
+from fsid.render.reference.bodies import Body, body_of, bsdf_of, pyramids
 from fsid.render.reference.dicing import View
 from fsid.render.reference.lights import emitters
 from fsid.render.reference.variant import load_mitsuba
