@@ -13,9 +13,8 @@ import rawpy
 
 from fsid.config import load_settings
 from fsid.dataset import GenerateConfig, encode, make_frame, make_sample, remake, shard_path, write_shard
-from fsid.dataset.attempt import split_of
 from fsid.dataset.checks import distance, fingerprint, flaw
-from fsid.dataset.config import Checks
+from fsid.dataset.config import Checks, split_of
 from fsid.dataset.settle import REDRAWS, settle
 from fsid.dataset.shards import read_records, read_samples
 from fsid.errors import FsidError

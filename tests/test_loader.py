@@ -11,11 +11,14 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
+from fsid.config import save_settings  # noqa: E402
+from fsid.dataset.config import DatasetConfig, GenerateConfig  # noqa: E402
 from fsid.dataset.index import index_mosaics  # noqa: E402
-from fsid.dataset.loader import Batch, PatchConfig, PatchDataset, patch_rand  # noqa: E402
+from fsid.dataset.loader import Batch, PatchConfig, PatchDataset, packed, window_rand  # noqa: E402
+from fsid.dataset.order import shuffled  # noqa: E402
 from fsid.dataset.shards import shard_path, write_shard  # noqa: E402
 from fsid.errors import FsidError  # noqa: E402
-from fsid.sensor import CFA_PATTERNS, Raw, load_profile, read_raw, write_dng  # noqa: E402
+from fsid.sensor import CFA_PATTERNS, NoiseLevel, Raw, add_noise, load_profile, read_raw, write_dng  # noqa: E402
 
 HEIGHT, WIDTH = 40, 60
 CONFIG = PatchConfig(size_px=16, batch=3, profiles=("pixel6", "galaxy-s22"), iso_min=400, iso_max=6400)
@@ -43,6 +46,18 @@ def dataset(tmp_path: Path, rng: np.random.Generator) -> Path:
     levels = {"black": 4096, "white": 65472}
     images = [raw(rng.integers(4096, 65472, (HEIGHT, WIDTH)), cfa, **levels) for cfa in CFA_PATTERNS]
     return write_dataset(tmp_path, images)
+
+
+def write_pairs(folder: Path, clean: list[Raw], noisy: list[Raw]) -> Path:
+    def dng(image: Raw) -> bytes:
+        buffer = io.BytesIO()
+        write_dng(buffer, image)
+        return buffer.getvalue()
+
+    pairs = enumerate(zip(clean, noisy, strict=True))
+    files = [(f"{i:08d}", {"clean.dng": dng(c), "noisy.dng": dng(n), "json": b"{}"}) for i, (c, n) in pairs]
+    write_shard(shard_path(folder, 0), files)
+    return folder
 
 
 def equal(a: Batch, b: Batch) -> bool:
@@ -73,7 +88,10 @@ def test_a_patch_is_an_isometry_of_the_image_in_rggb_geometry(
     colours = np.array(list(cfa)).reshape(2, 2)
     symmetries = set()
     for _ in range(100):
-        patch = patch_rand(rng, address, mosaic, 8)
+        corner = int(rng.integers(HEIGHT - 18 + 1)), int(rng.integers(WIDTH - 18 + 1))
+        cut, is_transposed = window_rand(rng, mosaic, corner, 8)
+        patch = np.empty((4, 8, 8), np.float32)
+        packed(address, mosaic, cut, patch)
         found = np.rint(patch * 65535).astype(int)
         view = np.empty((16, 16), int)
         for site, (r, c) in zip(found, ((0, 0), (0, 1), (1, 0), (1, 1)), strict=True):
@@ -87,6 +105,9 @@ def test_a_patch_is_an_isometry_of_the_image_in_rggb_geometry(
         seen = colours[place[..., 0] % 2, place[..., 1] % 2]
         assert (seen[:2, :2] == [["R", "G"], ["G", "B"]]).all()
         symmetries.add((*down, *right))
+        assert is_transposed == (down[0] == 0)
+        assert (place.min((0, 1)) >= corner).all()
+        assert (place.max((0, 1)) < np.add(corner, 18)).all()
     assert len(symmetries) == 8
 
 
@@ -115,7 +136,11 @@ def test_a_batch_depends_on_seed_and_step_alone(dataset: Path) -> None:
     patches = PatchDataset(dataset, CONFIG, seed=3)
     patches[0]
     assert equal(patches[7], PatchDataset(dataset, CONFIG, seed=3)[7])
-    others = [patches[8], PatchDataset(dataset, CONFIG, 4)[7], PatchDataset(dataset, CONFIG, 3, rank=1)[7]]
+    others = [
+        patches[8],
+        PatchDataset(dataset, CONFIG, 4)[7],
+        PatchDataset(dataset, CONFIG, 3, rank=1, world=2)[7],
+    ]
     assert not any(equal(patches[7], other) for other in others)
 
 
@@ -140,3 +165,108 @@ def test_unusable_datasets_are_named(dataset: Path, tmp_path: Path) -> None:
     shard.write_bytes(shard.read_bytes()[:5000])
     with pytest.raises(FsidError, match=r"shard-00000\.tar"):
         index_mosaics(dataset)
+
+
+def addresses(tmp_path: Path, per_shard: tuple[int, ...]) -> Path:
+    """Mosaics whose pixels carry their own address, in shards of different sizes."""
+    number = 0
+    for shard, count in enumerate(per_shard):
+        samples = []
+        for _ in range(count):
+            pixels = (
+                np.arange(HEIGHT * WIDTH, dtype=np.uint16).reshape(HEIGHT, WIDTH) + number * HEIGHT * WIDTH
+            )
+            buffer = io.BytesIO()
+            write_dng(buffer, raw(pixels))
+            samples.append((f"{number:08d}", {"clean.dng": buffer.getvalue(), "json": b"{}"}))
+            number += 1
+        write_shard(shard_path(tmp_path, shard), samples)
+    return tmp_path
+
+
+def pixels_of(batch: Batch) -> list[np.ndarray]:
+    return [np.rint(patch.numpy() * 65535).astype(int).ravel() for patch in batch.clean]
+
+
+@pytest.mark.parametrize(("world", "size"), [(1, 3), (2, 3), (3, 2), (5, 4)])
+def test_an_epoch_has_every_patch_once_on_whatever_ranks(world: int, size: int, tmp_path: Path) -> None:
+    """Uneven shards, and batches and ranks that do not divide the number of patches."""
+    data = addresses(tmp_path, (1, 4, 2, 1))
+    config = replace(CONFIG, size_px=6, batch=size)
+    ranks = [PatchDataset(data, config, seed=1, rank=rank, world=world) for rank in range(world)]
+    total = ranks[0].patches
+    assert total == 8 * (HEIGHT // 14) * (WIDTH // 14)
+    steps = -(-total // (world * size))
+    epoch = [patch for step in range(steps) for rank in ranks for patch in pixels_of(rank[step])][:total]
+    seen = np.concatenate(epoch)
+    assert len(np.unique(seen)) == len(seen) == total * 4 * 6 * 6
+    following = [
+        patch for step in range(steps, 2 * steps) for rank in ranks for patch in pixels_of(rank[step])
+    ]
+    assert {patch.min() for patch in following[:total]} != {patch.min() for patch in epoch}
+
+
+def test_every_length_is_permuted() -> None:
+    for length in (1, 2, 3, 64, 100, 1000):
+        orders = [[shuffled(place, length, seed, epoch) for place in range(length)] for seed, epoch in SEEDS]
+        assert all(sorted(order) == list(range(length)) for order in orders)
+    assert len({tuple(order) for order in orders}) == len(SEEDS)
+
+
+SEEDS = ((0, 0), (0, 1), (1, 0))
+
+
+def test_neighbours_of_an_order_are_unrelated() -> None:
+    order = np.array([shuffled(place, 4096, 5, 2) for place in range(4096)])
+    assert abs(np.corrcoef(order[:-1], order[1:])[0, 1]) < 0.05
+    assert abs(np.corrcoef(order, np.arange(4096))[0, 1]) < 0.05
+
+
+def test_real_processes_share_an_epoch(tmp_path: Path) -> None:
+    """torch.distributed (gloo) tells each of two processes how many there are."""
+    (tmp_path / "data").mkdir()
+    data = addresses(tmp_path / "data", (1, 4))
+    store = f"file://{tmp_path / 'store'}"
+    torch.multiprocessing.spawn(take_part, (2, store, data, tmp_path), nprocs=2)
+    first, second = (set(np.load(tmp_path / f"{rank}.npy").tolist()) for rank in range(2))
+    assert first
+    assert second
+    assert not first & second
+
+
+def take_part(rank: int, world: int, store: str, data: Path, out: Path) -> None:
+    torch.distributed.init_process_group("gloo", init_method=store, rank=rank, world_size=world)
+    patches = PatchDataset(data, replace(CONFIG, size_px=6), seed=1, rank=rank)
+    steps = patches.patches // (world * CONFIG.batch)
+    np.save(
+        out / f"{rank}.npy", np.concatenate([np.concatenate(pixels_of(patches[s])) for s in range(steps)])
+    )
+    torch.distributed.destroy_process_group()
+
+
+def test_stored_noise_comes_with_its_level(tmp_path: Path, rng: np.random.Generator) -> None:
+    """Gr and Gb have levels far apart, so that a transpose that forgets them is seen."""
+    level = NoiseLevel(k=(1e-3, 2e-3, 8e-3, 4e-3), sigma2=(1e-6,) * 4)
+    grey = [raw(np.full((400, 600), 0.3 * 65535), cfa) for cfa in CFA_PATTERNS]
+    noisy = [replace(add_noise(rng, image, level), iso=800.0) for image in grey]
+    config = replace(CONFIG, size_px=32, batch=64, noise="stored")
+    batch = PatchDataset(write_pairs(tmp_path, grey, noisy), config, seed=1)[0]
+    measured = (batch.noisy - batch.clean).square().mean((2, 3))
+    torch.testing.assert_close(measured, batch.k * 0.3 + batch.sigma2, rtol=0.25, atol=0)
+    assert len(batch.k.unique(dim=0)) == 2
+
+
+def test_stored_noise_that_does_not_exist_is_named(dataset: Path) -> None:
+    with pytest.raises(FsidError, match=r"no \*\.noisy\.dng"):
+        PatchDataset(dataset, replace(CONFIG, noise="stored"), seed=0)
+
+
+def test_validation_scenes_and_held_out_ones_are_not_drawn(dataset: Path) -> None:
+    settings = GenerateConfig(width=WIDTH, height=HEIGHT, validation_every=3)
+    save_settings(DatasetConfig(0, 2, settings), dataset / "config.yaml")
+    assert [mosaic.split for mosaic in index_mosaics(dataset)] == ["train", "train", "validation", "train"]
+    assert PatchDataset(dataset, CONFIG, seed=0).mosaics == 3
+    pairs = replace(settings, validation_every=0, noise_levels=2)
+    save_settings(DatasetConfig(0, 2, pairs), dataset / "config.yaml")
+    assert [mosaic.scene for mosaic in index_mosaics(dataset)] == [0, 0, 1, 1]
+    assert PatchDataset(dataset, replace(CONFIG, held_out=1), seed=0).mosaics == 2

@@ -1,9 +1,9 @@
 """Samples, shards on disk, and training patches from them."""
 
 from fsid.dataset.attempt import Sample, sample_key
-from fsid.dataset.config import GenerateConfig, generate_config
+from fsid.dataset.config import DatasetConfig, GenerateConfig, generate_config
 from fsid.dataset.estimate import Estimate, estimate
-from fsid.dataset.generate import DatasetConfig, Workforce, generate
+from fsid.dataset.generate import Workforce, generate
 from fsid.dataset.only import make_only
 from fsid.dataset.photos import find_photos, read_photo
 from fsid.dataset.picture import check_png, contact_sheet, grid, save_png

@@ -17,7 +17,7 @@ import numpy as np
 from fsid import __version__
 from fsid.config import to_plain
 from fsid.dataset.checks import distance, fingerprint, flaw
-from fsid.dataset.config import GenerateConfig
+from fsid.dataset.config import GenerateConfig, split_of
 from fsid.dataset.pictures import find_pictures, read_picture
 from fsid.dataset.tasks import Views, smaller
 from fsid.errors import FsidError
@@ -219,12 +219,6 @@ class _Shot:
 def sample_key(index: int) -> str:
     """The name of sample `index` inside the shards."""
     return f"{index:08d}"
-
-
-def split_of(config: GenerateConfig, number: int) -> str:
-    """ "train" or "validation": where scene or picture `number` belongs with all its samples."""
-    every = config.validation_every
-    return "validation" if every and number % every == every - 1 else "train"
 
 
 def _window_rand(

@@ -124,6 +124,25 @@ class GenerateConfig:
         return self.crops * self.exposures * self.noise_levels
 
 
+@dataclass(frozen=True)
+class DatasetConfig:
+    """What `config.yaml` beside the shards says: the identity of the dataset.
+
+    pictures: how many there are in the folder `generate.images`; 0 for scenes.
+    """
+
+    seed: int
+    shard_size: int
+    generate: GenerateConfig
+    pictures: int = 0
+
+
+def split_of(config: GenerateConfig, number: int) -> str:
+    """ "train" or "validation": where scene or picture `number` belongs with all its samples."""
+    every = config.validation_every
+    return "validation" if every and number % every == every - 1 else "train"
+
+
 def generate_config(name_or_file: str | Path | None, overrides: Sequence[str] = ()) -> GenerateConfig:
     """A built-in configuration by name (`fsid/configs`), or a YAML file; `key=value` overrides on top."""
     builtin = files("fsid.configs").joinpath(f"{name_or_file}.yaml")

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fsid.config import from_plain, read_yaml, save_settings, to_plain
-from fsid.dataset.config import GenerateConfig
+from fsid.dataset.config import DatasetConfig, GenerateConfig
 from fsid.dataset.crew import Crew, LocalCrew, run
 from fsid.dataset.pictures import find_pictures
 from fsid.dataset.sample import encode, make_frame
@@ -28,19 +28,6 @@ from fsid.sensor import load_profile
 SHARD_SIZE = 16
 SAMPLES_PER_WORKER = 320
 """After so many a worker is replaced, so that whatever a driver leaks stays small."""
-
-
-@dataclass(frozen=True)
-class DatasetConfig:
-    """What `config.yaml` beside the shards says: the identity of the dataset.
-
-    pictures: how many there are in the folder `generate.images`; 0 for scenes.
-    """
-
-    seed: int
-    shard_size: int
-    generate: GenerateConfig
-    pictures: int = 0
 
 
 @dataclass(frozen=True)

@@ -9,23 +9,34 @@ tar file. Indexing reads tar and TIFF headers only.
 from __future__ import annotations
 
 import tarfile
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
 import tifffile
 
+from fsid.config import from_plain, read_yaml
+from fsid.dataset.config import GenerateConfig, split_of
 from fsid.dataset.shards import find_shards
 from fsid.errors import FsidError
 from fsid.sensor import dng_tags
 from fsid.sensor.mosaic import check_cfa
+from fsid.sensor.raw import NoiseLevel
+
+_ORIGIN_KEYS = ("crops", "exposures", "noise_levels", "validation_every")
+"""Settings that say which scene a sample is from; others may be those of another version of FSID."""
 
 MosaicKind = Literal["clean", "noisy"]
 
 
 @dataclass(frozen=True)
 class StoredMosaic:
-    """One mosaic inside a shard: (height, width) uint16 at byte `offset` of the file `shard`."""
+    """One mosaic inside a shard: (height, width) uint16 at byte `offset` of the file `shard`.
+
+    noise: None where the DNG states none. scene: number of the scene or picture that it is from; split:
+    "train" or "validation", by scene.
+    """
 
     shard: Path
     key: str
@@ -35,6 +46,9 @@ class StoredMosaic:
     cfa: str
     black_level: int
     white_level: int
+    noise: NoiseLevel | None = None
+    scene: int = 0
+    split: str = "train"
 
 
 def index_mosaics(data_dir: Path, kind: MosaicKind = "clean") -> tuple[StoredMosaic, ...]:
@@ -43,12 +57,36 @@ def index_mosaics(data_dir: Path, kind: MosaicKind = "clean") -> tuple[StoredMos
     Raises FsidError where there is no shard, no sample, or a shard or DNG that is not readable as described
     above.
     """
-    found = tuple(mosaic for shard in find_shards(data_dir) for mosaic in _index_shard(shard, f".{kind}.dng"))
+    origin = _origin(data_dir)
+    found = tuple(
+        replace(mosaic, scene=scene, split=split)
+        for shard in find_shards(data_dir)
+        for mosaic in _index_shard(shard, f".{kind}.dng")
+        for scene, split in [origin(mosaic.key)]
+    )
     if not found:
         raise FsidError(
             f"{data_dir}: its shards hold no *.{kind}.dng; make the dataset again with `fsid generate`"
         )
     return found
+
+
+def _origin(data_dir: Path) -> Callable[[str], tuple[int, str]]:
+    """Scene and split of a sample by its key, from the config.yaml of the dataset, where there is one."""
+    file = data_dir / "config.yaml"
+    if not file.exists():
+        return lambda key: (int(key) if key.isdecimal() else 0, "train")
+    plain = read_yaml(file)
+    known = {key: value for key, value in plain.get("generate", {}).items() if key in _ORIGIN_KEYS}
+    config = from_plain(GenerateConfig, known, source=str(file))
+    pictures = int(plain.get("pictures", 0))
+
+    def origin(key: str) -> tuple[int, str]:
+        frame = int(key) // config.pairs_per_frame
+        scene = frame % pictures if pictures else frame
+        return scene, split_of(config, scene)
+
+    return origin
 
 
 def _index_shard(shard: Path, suffix: str) -> list[StoredMosaic]:
@@ -77,6 +115,7 @@ def _read_header(shard: Path, member: tarfile.TarInfo, key: str) -> StoredMosaic
                 cfa=check_cfa("".join("RGB"[colour] for colour in bytes(tags[dng_tags.CFA_PATTERN])), where),
                 black_level=_level(tags[dng_tags.BLACK_LEVEL]),
                 white_level=_level(tags[dng_tags.WHITE_LEVEL]),
+                noise=dng_tags.noise_level(tags),
             )
             plain = dng.byteorder == "<" and page.compression == 1 and page.dtype == "uint16"
             whole = len(page.dataoffsets) == 1 and page.databytecounts[0] == 2 * mosaic.height * mosaic.width

@@ -1,7 +1,16 @@
-"""Training patches: a fresh exposure of a random piece of a random clean mosaic, by (seed, step) alone.
+"""Training patches: every patch of the dataset once per epoch, with a fresh exposure, by (seed, step) alone.
 
     noisy = DN(clean + sqrt(k clean + sigma2 - r) n),    n ~ N(0, 1),    DN: round and clip as the camera's
     converter does, which adds r = 1/12 DN^2
+
+**Epochs.** A mosaic is cut into a grid of patches, which starts elsewhere in every epoch, and all patches of
+all mosaics come in a random order (`order`). With W ranks of batch B, the places of an epoch are dealt out in
+turn:
+
+    place = (step W + rank) B + slot
+
+So no patch comes twice in an epoch, on whatever ranks and with any number of loading processes; no rank has
+more than another, however the images lie in the shards; and a resumed training goes on where it was.
 
 **Flips.** A packed RAW hides where its four sites lie inside the 2x2 tile. Mirroring the packed planes keeps
 their names but moves R from the left of Gr to its right: edges between planes jump by a pixel, and the
@@ -10,16 +19,17 @@ one pixel along the mirrored axis, so that after the mirror R is again at the to
 "Learning raw image denoising with Bayer pattern unification and Bayer preserving augmentation"). The same
 shift unifies the cameras' patterns: every patch, whatever its CFA, is an RGGB tile seen from R. A transpose
 leaves R and B in place and swaps the places of Gr and Gb; the site names belong to the places (Gr shares its
-row with R), and noise is added after it, so that each place gets its own k and sigma2.
-
-**Order.** Batch `step` is drawn from `SeedSequence([seed, step, rank])` alone: a training that resumes at a
-step sees what an undisturbed one would have seen, with any number of loading processes.
+row with R). Noise is added after it, so that each place gets its own k and sigma2; those of stored noise are
+swapped with it.
 """
 
 from __future__ import annotations
 
+from collections import OrderedDict
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import torch
@@ -27,13 +37,21 @@ from torch import Tensor
 from torch.utils.data import Dataset
 
 from fsid.dataset.index import StoredMosaic, index_mosaics
+from fsid.dataset.order import mixed, shuffled
 from fsid.errors import FsidError
 from fsid.sensor.formula import stored, with_noise
+from fsid.sensor.gaussian import standard_normal
 from fsid.sensor.mosaic import site_offsets
 from fsid.sensor.noise import level_rand
 from fsid.sensor.profiles import CameraProfile, load_profile
 from fsid.sensor.quantise import ROUNDING_DN2
 from fsid.sensor.raw import NoiseLevel
+
+_OPEN_MAPS = 256
+"""Each mapped shard holds a file descriptor, of which a process has 1024."""
+
+Noise = Literal["fresh", "stored"]
+Cut = Callable[[np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -52,7 +70,8 @@ class PatchConfig:
 
     size_px: side of a patch in packed pixels (a 2 size_px square of the mosaic). profiles: cameras whose
     noise is drawn, by name or file. iso_min, iso_max: log-uniform range. held_out: so many images at the end
-    of the dataset are not drawn; they are for validation.
+    of the dataset are not drawn, nor others of their scenes; they are for validation. noise: "fresh" draws it
+    anew every time; "stored" takes the noisy images of the dataset, and profiles and ISO play no part.
     """
 
     size_px: int
@@ -61,99 +80,181 @@ class PatchConfig:
     iso_min: float
     iso_max: float
     held_out: int = 0
+    noise: Noise = "fresh"
 
 
 class PatchDataset(Dataset[Batch]):
-    """`dataset[step]` is the batch of that step; see the module docstring.
+    """`dataset[step]` is the batch of that step; see the module docstring. Validation scenes are left out.
 
     Feed it to a `DataLoader` with `batch_size=None` and `sampler=range(first_step, steps)`.
+    rank, world: this process among those that train together; world None asks `torch.distributed`.
     """
 
-    def __init__(self, data_dir: Path, config: PatchConfig, seed: int, rank: int = 0) -> None:
+    def __init__(
+        self, data_dir: Path, config: PatchConfig, seed: int, rank: int = 0, world: int | None = None
+    ) -> None:
         if not config.profiles:
             raise FsidError("profiles: name at least one camera profile to draw noise from")
-        found = index_mosaics(data_dir)
-        if not 0 <= config.held_out < len(found):
-            raise FsidError(f"{data_dir}: has {len(found)} images; held_out {config.held_out} leaves none")
-        self._mosaics = found[: len(found) - config.held_out]
+        self._rank, self._world = rank, world or _world_size()
+        if not 0 <= rank < self._world:
+            raise FsidError(f"rank {rank}: is not one of the {self._world} processes that train together")
+        self._mosaics = _training_mosaics(data_dir, config)
+        self._noisy = _noisy_of(data_dir, self._mosaics) if config.noise == "stored" else {}
         self._profiles = [load_profile(name) for name in config.profiles]
-        self._config, self._seed, self._rank = config, seed, rank
-        self._maps: dict[Path, np.memmap] = {}
-        needed = 2 * config.size_px + 2  # one tile more than the patch, for the shift of a mirrored window
-        for mosaic in self._mosaics:
-            if min(mosaic.height, mosaic.width) < needed:
+        self._config, self._seed = config, seed
+        self._maps: OrderedDict[Path, np.memmap] = OrderedDict()
+        self._pitch = (
+            2 * config.size_px + 2
+        )  # one tile more than the patch, for the shift of a mirrored window
+        grids = np.array([(m.height // self._pitch, m.width // self._pitch) for m in self._mosaics])
+        for mosaic, cells in zip(self._mosaics, grids, strict=True):
+            if not cells.all():
                 raise FsidError(
-                    f"{mosaic.shard}: {mosaic.key} is {mosaic.width}x{mosaic.height}, too small for "
-                    f"patches of {config.size_px} packed pixels (needs {needed}x{needed}); lower it"
+                    f"{mosaic.shard}: {mosaic.key} is {mosaic.width}x{mosaic.height}, too small for patches "
+                    f"of {config.size_px} packed pixels (needs {self._pitch}x{self._pitch}); lower it"
                 )
+        self._columns = grids[:, 1]
+        self._ends = np.cumsum(grids.prod(1))
 
     @property
     def mosaics(self) -> int:
         """How many images the patches come from."""
         return len(self._mosaics)
 
+    @property
+    def patches(self) -> int:
+        """How many patches an epoch has, all ranks together."""
+        return int(self._ends[-1])
+
     def __getitem__(self, step: int) -> Batch:
         config = self._config
         rng = np.random.default_rng([self._seed, step, self._rank])
-        clean = np.empty((config.batch, 4, config.size_px, config.size_px), np.float32)
-        levels: list[NoiseLevel] = []
-        cameras: list[CameraProfile] = []
-        for patch in clean:
-            mosaic = self._mosaics[rng.integers(len(self._mosaics))]
-            cameras.append(self._profiles[rng.integers(len(self._profiles))])
-            levels.append(level_rand(rng, cameras[-1], (config.iso_min, config.iso_max))[1])
-            patch[:] = patch_rand(rng, self._pixels(mosaic), mosaic, config.size_px)
-        k = np.array([level.k for level in levels], np.float32)
-        sigma2 = np.array([level.sigma2 for level in levels], np.float32)
-        noisy = _expose(rng, clean, k, sigma2, cameras)
+        shape = (config.batch, 4, config.size_px, config.size_px)
+        noisy, clean = np.empty(shape, np.float32), np.empty(shape, np.float32)
+        k, sigma2 = np.empty((config.batch, 4), np.float32), np.empty((config.batch, 4), np.float32)
+        first = (step * self._world + self._rank) * config.batch
+        for slot in range(config.batch):
+            mosaic, corner = self._patch_at(first + slot)
+            cut, is_transposed = window_rand(rng, mosaic, corner, config.size_px)
+            packed(self._pixels(mosaic), mosaic, cut, clean[slot])
+            if config.noise == "fresh":
+                camera = self._profiles[rng.integers(len(self._profiles))]
+                level = level_rand(rng, camera, (config.iso_min, config.iso_max))[1]
+                noisy[slot] = _exposed(rng, clean[slot], level, camera)
+            else:
+                capture, level = self._noisy[mosaic.key]
+                packed(self._pixels(capture), capture, cut, noisy[slot])
+                level = _transposed(level) if is_transposed else level
+            k[slot], sigma2[slot] = level.k, level.sigma2
         return Batch(*map(torch.from_numpy, (noisy, clean, k, sigma2)))
+
+    def _patch_at(self, position: int) -> tuple[StoredMosaic, tuple[int, int]]:
+        """Which patch comes at a position of the whole training: mosaic and top left corner of its cell."""
+        epoch, place = divmod(position, self.patches)
+        number = shuffled(place, self.patches, self._seed, epoch)
+        at = int(np.searchsorted(self._ends, number, side="right"))
+        mosaic = self._mosaics[at]
+        cell = number - (int(self._ends[at - 1]) if at else 0)
+        chance = mixed(self._seed, epoch, at)
+        corner = []
+        for index, size in zip(
+            divmod(cell, int(self._columns[at])), (mosaic.height, mosaic.width), strict=True
+        ):
+            free = size % self._pitch
+            chance, start = divmod(chance, free + 1)
+            corner.append(start + index * self._pitch)
+        return mosaic, (corner[0], corner[1])
 
     def _pixels(self, mosaic: StoredMosaic) -> np.ndarray:
         if mosaic.shard not in self._maps:
+            if len(self._maps) == _OPEN_MAPS:
+                self._maps.popitem(last=False)
             self._maps[mosaic.shard] = np.memmap(mosaic.shard, np.uint8, mode="r")
         end = mosaic.offset + 2 * mosaic.height * mosaic.width
-        stored = self._maps[mosaic.shard][mosaic.offset : end].view("<u2")
-        return stored.reshape(mosaic.height, mosaic.width)
+        pixels = self._maps[mosaic.shard][mosaic.offset : end].view("<u2")
+        return pixels.reshape(mosaic.height, mosaic.width)
 
     def __getstate__(self) -> dict[str, object]:
         """A worker process opens its own maps: a pickled memmap would be a copy of the shard."""
-        return {**self.__dict__, "_maps": {}}
+        return {**self.__dict__, "_maps": OrderedDict()}
 
 
-def patch_rand(
-    rng: np.random.Generator, pixels: np.ndarray, mosaic: StoredMosaic, size_px: int
-) -> np.ndarray:
-    """A random window of DN `pixels` (H, W), mirrored and transposed at random: (4, size_px, size_px), x.
+def window_rand(
+    rng: np.random.Generator, mosaic: StoredMosaic, corner: tuple[int, int], size_px: int
+) -> tuple[Cut, bool]:
+    """How to cut the cell at `corner` out of a mosaic, mirrored and transposed at random; whether transposed.
 
-    The window is placed so that after mirroring its first pixel is R and the tile is RGGB.
+    The cut (2 size_px, 2 size_px) is placed in the cell so that its first pixel is R and its tile RGGB.
     """
-    red = site_offsets(mosaic.cfa)[0]
-    window = []
-    for length, red_offset in zip(pixels.shape, red, strict=True):
-        mirrored = int(rng.integers(2))
-        parity = (red_offset + mirrored) % 2
-        start = parity + 2 * int(rng.integers((length - 2 * size_px - parity) // 2 + 1))
-        cut = slice(start, start + 2 * size_px)
-        window.append((cut, slice(None, None, -1 if mirrored else 1)))
-    patch = pixels[window[0][0], window[1][0]][window[0][1], window[1][1]]
+    slices = []
+    for start, red in zip(corner, site_offsets(mosaic.cfa)[0], strict=True):
+        is_mirrored = int(rng.integers(2))
+        start += (start + red + is_mirrored) % 2
+        stop = start + 2 * size_px
+        if is_mirrored:
+            slices.append(slice(stop - 1, start - 1 if start else None, -1))
+        else:
+            slices.append(slice(start, stop))
+    rows, columns = slices
     if rng.integers(2):
-        patch = patch.T
-    packed = np.stack([patch[r::2, c::2] for r, c in site_offsets("RGGB")]).astype(np.float32)
-    packed -= mosaic.black_level
-    packed /= mosaic.white_level - mosaic.black_level
-    return packed
+        return lambda pixels: pixels[rows, columns].T, True
+    return lambda pixels: pixels[rows, columns], False
 
 
-def _expose(
-    rng: np.random.Generator,
-    clean: np.ndarray,
-    k: np.ndarray,
-    sigma2: np.ndarray,
-    cameras: list[CameraProfile],
+def packed(pixels: np.ndarray, mosaic: StoredMosaic, cut: Cut, out: np.ndarray) -> None:
+    """The RGGB cut of DN `pixels` (H, W) as x, into `out` (4, size_px, size_px)."""
+    window = np.ascontiguousarray(cut(pixels))
+    for plane, (r, c) in zip(out, site_offsets("RGGB"), strict=True):
+        plane[:] = window[r::2, c::2]
+    out -= mosaic.black_level
+    out *= np.float32(1 / (mosaic.white_level - mosaic.black_level))
+
+
+def _exposed(
+    rng: np.random.Generator, clean: np.ndarray, level: NoiseLevel, camera: CameraProfile
 ) -> np.ndarray:
-    """`noisy_from_clean(...)` of the sensor, for a whole batch of levels and cameras at once."""
-    span = np.array([camera.span for camera in cameras], np.float32)[:, None, None, None]
-    black = np.array([camera.black_level for camera in cameras], np.float32)[:, None, None, None]
-    injected = np.maximum(sigma2[:, :, None, None] - ROUNDING_DN2 / span**2, 0)
-    normal = rng.standard_normal(clean.shape, dtype=np.float32)
-    return stored(with_noise(clean, normal, k[:, :, None, None], injected), black, span)
+    """`noisy_from_clean(...)` of the sensor, for one packed patch."""
+    k = np.array(level.k, np.float32)[:, None, None]
+    injected = np.array(level.sigma2, np.float32)[:, None, None] - np.float32(ROUNDING_DN2 / camera.span**2)
+    noisy = with_noise(clean, standard_normal(rng, clean.shape), k, injected.clip(min=0))
+    return stored(noisy, camera.black_level, camera.span)
+
+
+def _transposed(level: NoiseLevel) -> NoiseLevel:
+    def swapped(values: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
+        r, gr, gb, b = values
+        return r, gb, gr, b
+
+    return NoiseLevel(swapped(level.k), swapped(level.sigma2))
+
+
+def _training_mosaics(data_dir: Path, config: PatchConfig) -> tuple[StoredMosaic, ...]:
+    found = index_mosaics(data_dir)
+    if not 0 <= config.held_out < len(found):
+        raise FsidError(f"{data_dir}: has {len(found)} images; held_out {config.held_out} leaves none")
+    held_out = {mosaic.scene for mosaic in found[len(found) - config.held_out :]}
+    kept = tuple(m for m in found if m.split == "train" and m.scene not in held_out)
+    if not kept:
+        raise FsidError(f"{data_dir}: all its images are for validation; generate more scenes")
+    return kept
+
+
+def _noisy_of(
+    data_dir: Path, mosaics: tuple[StoredMosaic, ...]
+) -> dict[str, tuple[StoredMosaic, NoiseLevel]]:
+    """The noisy mosaic of every clean one, by key, and its level; FsidError where they do not fit."""
+    noisy = {mosaic.key: mosaic for mosaic in index_mosaics(data_dir, "noisy")}
+    found = {}
+    for clean in mosaics:
+        capture = noisy.get(clean.key)
+        if capture is None or capture.noise is None:
+            raise FsidError(f"{clean.shard}: {clean.key} has no noisy image that states its noise")
+        if (capture.height, capture.width) != (clean.height, clean.width):
+            raise FsidError(f"{clean.shard}: {clean.key} is no denoising pair, its two images differ in size")
+        found[clean.key] = capture, capture.noise
+    return found
+
+
+def _world_size() -> int:
+    distributed = torch.distributed
+    return distributed.get_world_size() if distributed.is_available() and distributed.is_initialized() else 1

@@ -7,8 +7,7 @@ from pathlib import Path
 
 from fsid.config import from_plain, read_yaml
 from fsid.dataset.attempt import Sample
-from fsid.dataset.config import GenerateConfig
-from fsid.dataset.generate import DatasetConfig
+from fsid.dataset.config import DatasetConfig, GenerateConfig
 from fsid.dataset.sample import encode, make_sample, remake
 from fsid.dataset.shards import read_records, shard_path
 from fsid.dataset.worker import Worker

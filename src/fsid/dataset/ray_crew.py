@@ -13,7 +13,6 @@ from typing import Any
 from fsid.dataset.crew import Lost, MakeWork, do_task
 from fsid.errors import FsidError
 
-
 _PATIENCE_S = 5.0
 
 
