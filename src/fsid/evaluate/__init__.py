@@ -1,6 +1,6 @@
 """Metrics, test sets, comparisons and the report.
 
-`experiments` and `demo` need PyTorch and are imported by name, `models` as soon as a model is named; the rest runs
+`experiments` and `demo` need PyTorch and are imported by name, and so does a trained model; the rest runs
 without it.
 """
 

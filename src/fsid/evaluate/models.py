@@ -12,7 +12,7 @@ from fsid.evaluate.testset import read_testset
 
 
 def model_method(path: Path, name: str) -> Method:
-    """A trained model as a method; its card says what it was trained on. Needs PyTorch, as no baseline does."""
+    """A trained model as a method; its card says what it was trained on. It needs PyTorch."""
     from fsid.denoise import denoise_raw, load_model
 
     model = load_model(path)
