@@ -51,7 +51,7 @@ def test_volumes_of_the_forms():
     angle = np.linspace(0, 2 * np.pi, 90, endpoint=False)
     circle = np.c_[np.cos(angle), np.sin(angle)]
     assert volume(plate(circle, 0.3, 1e-5)) == pytest.approx(np.pi * 0.3, rel=2e-3)
-    x, one = np.linspace(0, 2, 12), np.ones(12)
+    x = np.linspace(0, 2, 12)
     assert volume(slab(np.c_[x, 0.2 + 0 * x], np.c_[x, -0.3 + 0 * x], 0.1, 1e-5)) == pytest.approx(
         0.1, rel=1e-3
     )

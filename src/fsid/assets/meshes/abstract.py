@@ -1,28 +1,47 @@
-"""Shapes that no shop sells: blobs, revolutions, knots, stacks of sheets, strands, draped cloth.
+"""Shapes that no shop sells: blobs, revolutions, sweeps, stacks of sheets, facets, holes.
 
-They add what furniture lacks: curved silhouettes in all directions, fine parallel edges, self-shadowing.
+They add what furniture lacks: curved silhouettes in all directions, sharp and soft edges side by side,
+self-shadowing, thin layers over each other as in the dead-leaves model of natural images.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from fsid.assets.forms import loft, plate, turns_to
 from fsid.assets.registry import Parts, mesh_family
-from fsid.assets.solids import Solid, ball, ball_directions, copies, lathe, rotation_matrix, sheet, sweep
+from fsid.assets.solids import (
+    Solid,
+    ball,
+    ball_directions,
+    box,
+    copies,
+    lathe,
+    rotation_matrix,
+    sheet,
+    sheets,
+    smooth_normals,
+    tubes,
+)
 
 
 @mesh_family("blob")
 def blob(rng: np.random.Generator) -> Parts:
-    """Sphere displaced by a sum of random plane waves with falling amplitude."""
-    d = ball_directions(5)
+    """Sphere displaced by random plane waves of falling amplitude, smooth or ridged, of two stuffs."""
+    d = ball_directions(4)
     radii = np.ones(len(d))
-    rough = rng.uniform(0.1, 0.32)
+    rough, ridged = rng.uniform(0.1, 0.32), rng.random() < 0.35
     for k in (1.5, 3, 6, 12):
         for _ in range(4):
             wave = rng.normal(size=3)
-            radii += rough / k * np.sin(d @ wave * (k / np.linalg.norm(wave)) * 2 + rng.uniform(0, 6.3))
-    shape = ball(rng.uniform(0.1, 0.3) * np.maximum(radii, 0.25), 5)
-    return {"body": [shape]}
+            swell = np.sin(d @ wave * (k / np.linalg.norm(wave)) * 2 + rng.uniform(0, 6.3))
+            radii += rough / k * (0.6 - 1.6 * np.abs(swell) if ridged else swell)
+    shape = ball(rng.uniform(0.1, 0.3) * np.maximum(radii, 0.25), 4)
+    low = radii[shape.faces].mean(1) < np.quantile(radii, rng.uniform(0, 0.6))
+    parts = {"body": [Solid(shape.vertices, shape.normals, shape.faces[~low])]}
+    return parts | (
+        {"hollows": [Solid(shape.vertices, shape.normals, shape.faces[low])]} if low.any() else {}
+    )
 
 
 @mesh_family("revolution")
@@ -36,105 +55,234 @@ def revolution(rng: np.random.Generator) -> Parts:
     share = np.repeat(rng.random(steps) < 0.5, 6)
     r = radius * np.where(share, stepped, smooth)
     cut = 6 * int(rng.integers(1, steps - 1))
-    lower = lathe([(0, 0), *np.c_[r, z][:cut], (0, z[cut - 1])], 40)
-    upper = lathe([(0, z[cut - 1]), *np.c_[r, z][cut:], (0, height)], 40)
+    segments = int(rng.choice((5, 6, 8, 40, 40, 40)))
+    lower = lathe([(0, 0), *np.c_[r, z][:cut], (0, z[cut - 1])], segments)
+    upper = lathe([(0, z[cut - 1]), *np.c_[r, z][cut:], (0, height)], segments)
+    if segments < 10:
+        lower, upper = _faceted(lower), _faceted(upper)
     return {"lower": [lower], "upper": [upper]}
 
 
-@mesh_family("knot")
-def knot(rng: np.random.Generator) -> Parts:
-    """Closed tube along a random smooth curve, like a hose or a thick cord."""
-    t = np.linspace(0, 2 * np.pi, 260, endpoint=False)[:, None]
-    path = np.zeros((260, 3))
-    for k in range(1, int(rng.integers(3, 6))):
-        path += rng.normal(0, 1 / k, 3) * np.cos(k * t) + rng.normal(0, 1 / k, 3) * np.sin(k * t)
-    path *= rng.uniform(0.15, 0.3) / np.abs(path).max()
-    along = np.roll(path, -1, axis=0) - path
-    along /= np.linalg.norm(along, axis=1, keepdims=True)
-    bend = np.linalg.norm(np.roll(along, -1, axis=0) - along, axis=1)
-    tightest = (np.linalg.norm(np.roll(path, -1, axis=0) - path, axis=1) / bend).min()
-    thick = min(rng.uniform(0.012, 0.035), 0.7 * tightest)
-    radius = thick * (1 + rng.uniform(0, 0.25) * np.cos(int(rng.integers(5, 40)) * t[:, 0]))
-    return {"tube": [sweep(path, radius, 14, closed=True)]}
-
-
-@mesh_family("yarn_ball")
-def yarn_ball(rng: np.random.Generator) -> Parts:
-    """A ball wound from a cord in great circles."""
-    radius, thread = rng.uniform(0.04, 0.1), rng.uniform(0.003, 0.007)
-    angle = np.linspace(0, 2 * np.pi, 40, endpoint=False)
-    ring = np.c_[radius * np.cos(angle), radius * np.sin(angle), 0.06 * radius * np.sin(3 * angle)]
-    loop = sweep(ring, thread, 6, closed=True)
-    turns = [rotation_matrix(*rng.uniform(0, 360, 3)) * rng.uniform(0.94, 1.06) for _ in range(32)]
-    strands = copies(loop, np.array(turns), np.zeros((32, 3)))
-    return {"yarn": [strands], "core": [ball(radius * 0.97, 3)]}
+@mesh_family("sweep")
+def sweep_family(rng: np.random.Generator) -> Parts:
+    """Random cross section, star to square, swept along a random curve while it twists and tapers."""
+    n, m = int(rng.choice((5, 8, 12, 40))), 70
+    a = np.linspace(0, 2 * np.pi, n, endpoint=False)
+    shape = 1 + sum(rng.normal(0, 0.22 / k) * np.cos(k * a + rng.uniform(0, 6.3)) for k in (2, 3, 4, 5))
+    section = np.clip(shape, 0.35, None)[:, None] * np.c_[np.cos(a), np.sin(a) * rng.uniform(0.4, 1)]
+    t = np.linspace(0, 1, m)
+    height = rng.uniform(0.2, 0.6)
+    path = np.stack(
+        [
+            sum(rng.normal(0, 0.16 / k**1.5) * np.sin(np.pi * k * t + rng.uniform(0, 6.3)) for k in (1, 2, 3))
+            * height
+            * 1.6
+            for _ in range(2)
+        ]
+        + [height * t],
+        axis=1,
+    )
+    twist = rng.normal(0, 3) * t
+    size = rng.uniform(0.03, 0.09) * (
+        1 + rng.uniform(-0.7, 0.5) * t + rng.uniform(0, 0.25) * np.cos(2 * np.pi * rng.uniform(1, 5) * t)
+    )
+    c, s = np.cos(twist)[:, None], np.sin(twist)[:, None]
+    x = size[:, None] * (c * section[:, 0] - s * section[:, 1])
+    y = size[:, None] * (s * section[:, 0] + c * section[:, 1])
+    rings = path[:, None] + np.stack([x, y, np.zeros_like(x)], axis=-1)
+    solid = loft(rings)
+    return {"body": [_faceted(solid) if n < 10 else solid]}
 
 
 @mesh_family("sheet_stack")
 def sheet_stack(rng: np.random.Generator) -> Parts:
-    """Curled papers scattered over each other, in three colours."""
+    """Dead leaves: curled papers of three sorts, square, round or torn, scattered over each other."""
     parts: tuple[list[Solid], ...] = ([], [], [])
-    count, size = int(rng.integers(6, 22)), rng.uniform(0.1, 0.3)
-    for k in range(count):
-        x, y = size * rng.uniform(0.4, 1), size * rng.uniform(0.4, 1.3)
-        u, v = np.meshgrid(np.linspace(-1, 1, 14), np.linspace(-1, 1, 14))
-        curl = rng.normal(0, 0.05, 3) * size
-        z = curl[0] * u**2 + curl[1] * v**2 + curl[2] * u * v + 0.004 * np.sin(rng.normal(0, 3) * u + 3 * v)
-        paper = sheet(np.stack([u * x / 2, v * y / 2, z - z.min() * 0.3], axis=-1), 0.0007)
-        dx, dy = rng.normal(0, 0.35 * size, 2)
-        tilt_x, tilt_y = rng.normal(0, 4, 2)
-        parts[rng.integers(3)].append(
-            paper.turned(tilt_x, tilt_y, rng.uniform(0, 360)).at(dx, dy, 0.0035 * k)
-        )
-    named = zip(("paper_a", "paper_b", "paper_c"), parts, strict=True)
+    size, n = rng.uniform(0.1, 0.3), 9
+    height = 0.0
+    for count in rng.integers(2, 9, 3):
+        grids = []
+        for _ in range(count):
+            u, v = np.meshgrid(np.linspace(-1, 1, n), np.linspace(-1, 1, n))
+            if rng.random() < 0.4:
+                u, v = u * np.sqrt(1 - v * v / 2), v * np.sqrt(1 - u * u / 2)
+            x, y = size * rng.uniform(0.3, 1), size * rng.uniform(0.3, 1.3)
+            curl = rng.normal(0, 0.05, 3) * size
+            z = (
+                curl[0] * u**2
+                + curl[1] * v**2
+                + curl[2] * u * v
+                + 0.004 * np.sin(rng.normal(0, 3) * u + 3 * v)
+            )
+            tilt = rotation_matrix(rng.normal(0, 4), rng.normal(0, 4), rng.uniform(0, 360))
+            place = (*rng.normal(0, 0.35 * size, 2), height)
+            grids.append(
+                np.stack([u * x / 2, v * y / 2, z - 0.3 * z.min()], axis=-1) @ tilt.T + np.array(place)
+            )
+            height += 0.0035
+        parts[int(rng.integers(3))].append(sheets(np.array(grids), 0.0007))
+    named = zip(("paper", "paper_second", "paper_third"), parts, strict=True)
     return {name: solids for name, solids in named if solids}
 
 
-@mesh_family("tuft")
-def tuft(rng: np.random.Generator) -> Parts:
-    """Grass-like strands that bend outwards from one root."""
-    reach, count = rng.uniform(0.15, 0.45), int(rng.integers(50, 130))
-    t = np.linspace(0, 1, 9)
-    half = 0.5 * rng.uniform(0.004, 0.012) * (1 - 0.92 * t)
-    bend = rng.uniform(0.3, 1.1)
-    spine_x, spine_z = bend * t**2 * reach * 0.7, reach * (t - 0.35 * bend * t**2)
-    across = np.linspace(-1, 1, 3)
-    grid = np.stack(
-        np.broadcast_arrays(
-            spine_x[:, None] - 0.3 * half[:, None] * np.abs(across), half[:, None] * across, spine_z[:, None]
-        ),
-        axis=-1,
+@mesh_family("polyhedron")
+def polyhedron(rng: np.random.Generator) -> Parts:
+    """Random convex bodies with flat faces: cut gems, boulders of glass, building stones."""
+    from scipy.spatial import ConvexHull
+
+    bodies = []
+    for k in range(int(rng.integers(1, 4))):
+        count = int(rng.choice((6, 9, 16, 40)))
+        points = rng.normal(size=(count, 3))
+        points /= np.linalg.norm(points, axis=1, keepdims=True) ** rng.uniform(0.6, 1.0)
+        points *= rng.uniform(0.05, 0.16) * rng.uniform(0.5, 1.0, 3)
+        hull = ConvexHull(points)
+        corners = points[hull.simplices]
+        outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        flip = (outward * (corners.mean(1) - points.mean(0))).sum(1) < 0
+        corners[flip] = corners[flip][:, ::-1]
+        faces = np.arange(3 * len(corners)).reshape(-1, 3)
+        solid = Solid(corners.reshape(-1, 3), smooth_normals(corners.reshape(-1, 3), faces), faces)
+        bodies.append(solid.resting().at(0.14 * k, 0.06 * (k % 2)))
+    return {"glass_gem": bodies[:1], "stone": bodies[1:]} if len(bodies) > 1 else {"glass_gem": bodies}
+
+
+@mesh_family("lattice")
+def lattice(rng: np.random.Generator) -> Parts:
+    """Scaffold of bars between balls on a bent grid: struts cross at every angle and hide each other."""
+    n = rng.integers(2, 5, 3)
+    cell, thick = rng.uniform(0.05, 0.12), rng.uniform(0.003, 0.009)
+    grid = np.stack(np.meshgrid(*(np.arange(k) for k in n), indexing="ij"), -1).astype(float)
+    grid = cell * (grid + rng.normal(0, rng.uniform(0, 0.16), grid.shape))
+    struts = []
+    for axis in range(3):
+        first, second = np.split(np.stack([np.delete(grid, -1, axis), np.delete(grid, 0, axis)]), 2)
+        struts.append(np.stack([first[0].reshape(-1, 3), second[0].reshape(-1, 3)], axis=1))
+    if rng.random() < 0.6:
+        struts.append(np.stack([grid[:-1, :-1, :-1].reshape(-1, 3), grid[1:, 1:, 1:].reshape(-1, 3)], axis=1))
+    ends = np.concatenate(struts)
+    bars = tubes(ends[:, :1] + np.linspace(0, 1, 3)[None, :, None] * (ends[:, 1:] - ends[:, :1]), thick, 7)
+    nodes = grid.reshape(-1, 3)
+    knob = (
+        ball(thick * rng.uniform(1.3, 2.6), 1)
+        if rng.random() < 0.6
+        else box(3 * thick, 3 * thick, 3 * thick, 0.0006, 1).at(z=-1.5 * thick)
     )
-    blade = sheet(grid, 0.0008)
-    turns = [
-        rotation_matrix(0, rng.uniform(-15, 30), rng.uniform(0, 360)) * rng.uniform(0.4, 1.1)
-        for _ in range(count)
-    ]
-    places = np.c_[rng.normal(0, 0.05 * reach, (count, 2)), np.zeros(count)]
-    return {"strands": [copies(blade, np.array(turns), places)]}
+    return {"metal_bars": [bars], "nodes": [copies(knob, np.repeat(np.eye(3)[None], len(nodes), 0), nodes)]}
 
 
-@mesh_family("draped_cloth")
-def draped_cloth(rng: np.random.Generator) -> Parts:
-    """A cloth hanging in folds over an invisible round stand; its hem has a border of its own."""
-    n = 66
-    u, v = np.meshgrid(np.linspace(-1, 1, n), np.linspace(-1, 1, n))
-    size, top = rng.uniform(0.2, 0.45), rng.uniform(0.3, 0.6)
-    radius, angle = np.hypot(u, v), np.arctan2(v, u)
-    over = np.maximum(radius - top, 0)
-    folds = int(rng.integers(5, 12))
-    wave = np.cos(folds * angle + rng.uniform(0, 6.3) + 0.6 * np.sin(2 * angle + rng.uniform(0, 6.3)))
-    spread = np.minimum(radius, top) + 0.25 * over + 0.3 * over * wave
-    ripple = 0.006 * np.sin(u * rng.normal(0, 9) + v * rng.normal(0, 9))
-    z = -0.9 * over + ripple + 0.05 * over * wave
-    points = np.stack([spread * np.cos(angle), spread * np.sin(angle), z], axis=-1) * size
-    rows = 5
+@mesh_family("terrain")
+def terrain(rng: np.random.Generator) -> Parts:
+    """Model of a landscape: fractal relief, terraced or smooth, cut out with four walls, with water in it."""
+    n, size = 56, rng.uniform(0.2, 0.5)
+    f = np.hypot(np.fft.fftfreq(n)[:, None], np.fft.rfftfreq(n)[None])
+    f[0, 0] = 1
+    spectrum = (
+        f ** -rng.uniform(1.6, 2.3) * np.exp(2j * np.pi * rng.random(f.shape)) * rng.rayleigh(size=f.shape)
+    )
+    spectrum[0, 0] = 0
+    z = np.fft.irfft2(spectrum, (n, n))
+    z = (z - z.min()) / np.ptp(z)
+    if rng.random() < 0.35:
+        steps = int(rng.integers(5, 11))
+        z = (np.floor(z * steps) + np.clip((z * steps % 1) * 4 - 3, 0, 1)) / steps
+    u, v = np.meshgrid(np.linspace(-0.5, 0.5, n), np.linspace(-0.5, 0.5, n))
+    tall = size * rng.uniform(0.15, 0.45)
+    top = np.stack([u * size, v * size, 0.02 + z * tall], axis=-1)
+    parts = {"soil": [sheet(top, 0.001), _skirt(top)]}
+    if rng.random() < 0.5:
+        level = 0.02 + tall * float(np.quantile(z, rng.uniform(0.15, 0.5)))
+        parts["liquid"] = [box(size - 0.004, size - 0.004, level - 0.004, 0.0005, 1).at(z=0.004)]
+    return parts
+
+
+@mesh_family("paper_folds")
+def paper_folds(rng: np.random.Generator) -> Parts:
+    """Crumpled or pleated paper: flat facets between sharp creases."""
+    size, n = rng.uniform(0.12, 0.3), int(rng.integers(7, 15))
+    u, v = np.meshgrid(np.linspace(-0.5, 0.5, n), np.linspace(-0.5, 0.5, n))
+    if rng.random() < 0.5:
+        jitter = rng.normal(0, 0.28 / n, (2, n, n))
+        z = rng.normal(0, rng.uniform(0.25, 0.6) / n, (n, n)) + rng.uniform(0, 0.6) * (u**2 + v**2)
+        points = np.stack([u + jitter[0], v + jitter[1], z], axis=-1)
+    else:
+        deep, zig = rng.uniform(0.3, 0.9) / n, rng.uniform(0.15, 0.5) / n
+        i, j = np.meshgrid(np.arange(n), np.arange(n))
+        points = np.stack([u * 0.8 + 0 * v, v + zig * (-1.0) ** i, deep * (-1.0) ** j + 0 * u], axis=-1)
+    crumpled = _faceted(sheet(points * size, 0.0009))
+    return {"paper": [crumpled.turned(rng.normal(0, 8), rng.normal(0, 8))]}
+
+
+@mesh_family("petal_burst")
+def petal_burst(rng: np.random.Generator) -> Parts:
+    """Thin curved plates that radiate from a middle, like an artichoke, a paper star or a turbine."""
+    count, rows = int(rng.integers(7, 18)), int(rng.integers(1, 5))
+    size, twist = rng.uniform(0.08, 0.2), rng.normal(0, 0.8)
+    s, across = np.linspace(0.05, 1, 10)[:, None], np.linspace(-1, 1, 5)[None]
+    half = rng.uniform(0.1, 0.35) * np.sin(np.pi * s ** rng.uniform(0.5, 1.2)) + 0.01
+    roll = twist * s
+    x, y, z = np.broadcast_arrays(
+        s, half * across * np.cos(roll), half * across * np.sin(roll) + rng.uniform(-0.4, 0.7) * s**2
+    )
+    blade = sheet(np.stack([x, y, z], axis=-1) * size, 0.0015)
+    groups: tuple[list[np.ndarray], ...] = ([], [])
+    for row in range(rows):
+        for k in range(count):
+            lift = -75 * row / max(rows, 2) - rng.uniform(0, 6)
+            groups[row % 2].append(
+                rotation_matrix(rng.normal(0, 3), lift, 360 * (k + 0.5 * row) / count) * (1 - 0.12 * row)
+            )
+    parts = {"core": [ball(0.16 * size, 3)]}
+    for name, turns in zip(("petal", "petal_other"), groups, strict=True):
+        if turns:
+            parts[name] = [copies(blade, np.array(turns), np.zeros((len(turns), 3)))]
+    return parts
+
+
+@mesh_family("cluster")
+def cluster(rng: np.random.Generator) -> Parts:
+    """Heap of one random form at many sizes: cubes, beads, rods, discs stuck on a core at all angles."""
+    core, count = rng.uniform(0.04, 0.1), int(rng.integers(24, 70))
+    d = rng.normal(size=(count, 3))
+    d /= np.linalg.norm(d, axis=1, keepdims=True)
+    size = rng.uniform(0.25, 0.6) * core
+    kind = int(rng.integers(4))
+    a = 2 * np.pi * np.arange(6) / 6
+    form = (
+        box(size, size, size, 0.06 * size, 1).at(z=-0.4 * size),
+        ball(0.5 * size, 2),
+        box(0.3 * size, 0.3 * size, 2.4 * size, 0.03 * size, 1),
+        plate(0.8 * size * np.c_[np.cos(a), np.sin(a)], 0.25 * size, 0.02 * size),
+    )[kind]
+    count = min(count, 9000 // len(form.faces))
+    d = d[:count]
+    turns = turns_to(d, rng.uniform(0, 6.3, count)) * rng.uniform(0.4, 1.3, (count, 1, 1))
+    cut = count // 2
+    places = d * core
     return {
-        "cloth": [sheet(points[rows:-rows, rows:-rows], 0.004)],
-        "hem": [
-            sheet(points[: rows + 1], 0.005),
-            sheet(points[-rows - 1 :], 0.005),
-            sheet(points[rows:-rows, : rows + 1], 0.005),
-            sheet(points[rows:-rows, -rows - 1 :], 0.005),
-        ],
+        "first": [copies(form, turns[:cut], places[:cut])],
+        "second": [copies(form, turns[cut:], places[cut:])],
+        "core": [ball(core, 3)],
     }
+
+
+def _faceted(solid: Solid) -> Solid:
+    """Every triangle on its own, flat-shaded."""
+    points = solid.vertices[solid.faces]
+    cross = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
+    keep = np.linalg.norm(cross, axis=1) > 1e-12
+    points, cross = points[keep], cross[keep]
+    normals = cross / np.linalg.norm(cross, axis=1, keepdims=True)
+    faces = np.arange(3 * len(points)).reshape(-1, 3)
+    return Solid(points.reshape(-1, 3), np.repeat(normals, 3, axis=0), faces)
+
+
+def _skirt(top: np.ndarray) -> Solid:
+    """Block below a height field (n, m, 3): four sides and the bottom at z = 0, just below the surface."""
+    border = np.concatenate([top[0, :-1], top[:-1, -1], top[-1, :0:-1], top[:0:-1, 0]])
+    inset = border * (0.999, 0.999, 1) - np.array((0, 0, 0.0012))
+    ring = np.stack([inset * (1, 1, 0), inset])
+    solid = loft(ring)
+    keep = np.abs(solid.normals[solid.faces[:, 0]][:, 2]) < 0.5
+    low = np.abs(solid.vertices[solid.faces].mean(1)[:, 2]) < 1e-9
+    return _faceted(Solid(solid.vertices, solid.normals, solid.faces[keep | low]))

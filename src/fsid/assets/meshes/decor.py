@@ -1,70 +1,154 @@
-"""What stands on furniture: vessels, lamps, plants, frames, screens, fruit, stones."""
+"""Things to look at: framed pictures, clocks, globes."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from fsid.assets.forms import scatter_rand
+from fsid.assets.forms import plate, slab
 from fsid.assets.registry import Parts, mesh_family
 from fsid.assets.solids import (
+    Solid,
     ball,
     ball_directions,
     box,
+    cylinder,
+    lathe,
+    sweep,
 )
-
-
-@mesh_family("stones")
-def stones(rng: np.random.Generator) -> Parts:
-    """Angular to round stones: balls cut by random planes."""
-    count, size = int(rng.integers(1, 4)), rng.uniform(0.04, 0.15)
-    d = ball_directions(4)
-    out = []
-    for dx, dy in scatter_rand(rng, count, 1.7 * size):
-        planes = rng.normal(size=(int(rng.integers(8, 30)), 3))
-        planes /= np.linalg.norm(planes, axis=1, keepdims=True)
-        facing = np.clip(d @ planes.T, 1e-3, None)
-        radii = np.minimum(1.05, (rng.uniform(0.55, 0.95, len(planes)) / facing).min(1))
-        rough = sum(np.sin(d @ rng.normal(0, 9, 3) + rng.uniform(0, 6.3)) for _ in range(8))
-        stone = ball(size * rng.uniform(0.5, 1) * (radii + 0.006 * rough), 4)
-        out.append(
-            stone.stretched(1, 1, rng.uniform(0.5, 1)).turned(*rng.uniform(0, 360, 3)).at(dx, dy, size * 0.6)
-        )
-    return {"stone": out}
 
 
 @mesh_family("picture_frame")
 def picture_frame(rng: np.random.Generator) -> Parts:
-    """Framed picture with a mount, standing upright with a slight lean."""
-    x, z, wide, deep = (
-        rng.uniform(0.15, 0.6),
-        rng.uniform(0.15, 0.6),
-        rng.uniform(0.01, 0.05),
-        rng.uniform(0.012, 0.03),
-    )
-    round_ = rng.uniform(0.002, 0.3 * wide)
-    frame = [box(x, deep, wide, round_, 3).at(z=s) for s in (0, z - wide)]
-    frame += [box(wide, deep, z - 2 * wide, round_, 3).at(s * (x - wide) / 2, 0, wide) for s in (-1, 1)]
-    mount = box(x - wide, 0.004, z - wide, 0.001, 1).at(z=wide / 2)
+    """Framed picture with a mount, upright with a slight lean: flat, round, stepped or oval frame."""
+    x, z = rng.uniform(0.15, 0.6), rng.uniform(0.15, 0.6)
+    wide, deep, lean = rng.uniform(0.01, 0.05), rng.uniform(0.012, 0.03), rng.uniform(0, 12)
     border = rng.uniform(0.1, 0.3) * min(x, z)
+    if rng.random() < 0.25:
+        a = np.linspace(0, 2 * np.pi, 72, endpoint=False)
+        oval = np.c_[np.cos(a) * (x - wide) / 2, np.sin(a) * (z - wide) / 2]
+        ring = np.c_[oval[:, 0], 0 * a, oval[:, 1]]
+        frame = [sweep(ring, wide / 2, 12, closed=True)]
+        frame += [sweep(ring * k, 0.12 * wide, 8, closed=True).at(y=-0.42 * wide) for k in (0.93, 1.04)]
+        mount = plate(oval, 0.004, 0.0005).turned(x_deg=90)
+        picture = plate(oval * (1 - border / x), 0.003, 0.0004).turned(x_deg=90).at(y=-0.0022)
+        parts = {"frame": frame, "paper_mount": [mount], "paper_picture": [picture]}
+        return {name: [s.at(z=z / 2).turned(x_deg=-lean) for s in solids] for name, solids in parts.items()}
+    round_ = rng.uniform(0.002, 0.3 * wide)
+    frame = _frame(x, z, wide, deep, round_)
+    if rng.random() < 0.5:
+        step = rng.uniform(0.2, 0.5) * wide
+        inner = _frame(
+            x - 2 * wide + 2 * step - 0.003, z - 2 * wide + 2 * step - 0.003, step, deep * 1.25, 0.3 * step
+        )
+        frame += [s.at(z=wide - step + 0.0015) for s in inner]
+    mount = box(x - wide, 0.004, z - wide, 0.001, 1).at(z=wide / 2)
     picture = box(x - wide - border, 0.003, z - wide - border, 0.0005, 1).at(0, -0.002, (wide + border) / 2)
-    lean = rng.uniform(0, 12)
-    parts = {"frame": frame, "mount": [mount], "picture": [picture]}
+    parts = {"frame": frame, "paper_mount": [mount], "paper_picture": [picture]}
     return {name: [s.turned(x_deg=-lean) for s in solids] for name, solids in parts.items()}
 
 
-@mesh_family("monitor")
-def monitor(rng: np.random.Generator) -> Parts:
-    """Flat screen on a stand, with a bezel around the display."""
-    x = rng.uniform(0.4, 0.75)
-    z, rim, lift = x * rng.uniform(0.5, 0.65), rng.uniform(0.006, 0.02), rng.uniform(0.06, 0.16)
-    tilt = rng.uniform(-4, 12)
-    shell = [box(x, 0.03, z, 0.006, 3)]
-    shell += [box(x, 0.008, rim, 0.002).at(0, -0.017, low) for low in (0, z - rim)]
-    shell += [box(rim, 0.008, z, 0.002).at(s * (x - rim) / 2, -0.017) for s in (-1, 1)]
-    display = box(x - 2 * rim, 0.003, z - 2 * rim, 0.0005, 1).at(0, -0.0158, rim)
-    stand = [box(0.05, 0.02, lift + z * 0.5, 0.005).at(0, 0.03), box(0.26, 0.2, 0.012, 0.005, 3).at(0, 0.02)]
-    return {
-        "shell": [s.turned(x_deg=-tilt).at(z=lift) for s in shell],
-        "display": [display.turned(x_deg=-tilt).at(z=lift)],
-        "stand": stand,
-    }
+@mesh_family("clock")
+def clock(rng: np.random.Generator) -> Parts:
+    """Wall, desk or alarm clock: case, dial, hour marks, hands at any time, glass, perhaps bells and feet."""
+    radius, deep = rng.uniform(0.05, 0.17), rng.uniform(0.02, 0.06)
+    rim = radius * rng.uniform(0.06, 0.16)
+    case = [
+        lathe(
+            [
+                (0, 0),
+                (radius, 0),
+                (radius, deep),
+                (radius - 0.3 * rim, deep + 0.4 * rim),
+                (radius - rim, deep),
+                (radius - rim, 0.6 * deep),
+                (0, 0.6 * deep),
+            ],
+            56,
+            30,
+        )
+    ]
+    dial = cylinder(radius - rim + 0.0006, 0.0016, 0.0003, 48).at(z=0.6 * deep)
+    front, marks, hands = 0.6 * deep + 0.0016, [], []
+    number = int(rng.choice((4, 12, 12, 60)))
+    for k in range(number):
+        long = radius * (0.12 if number < 60 or k % 5 == 0 else 0.05)
+        mark = box(0.025 * radius, long, 0.001, 0.0002, 1).at(y=0.72 * radius, z=front - 0.0002)
+        marks.append(mark.turned(z_deg=360 * k / number))
+    minute = rng.uniform(0, 60)
+    hour = rng.integers(12) + minute / 60
+    for k, (angle, long, wide) in enumerate(
+        ((hour / 12, 0.45, 0.035), (minute / 60, 0.68, 0.022), (rng.random(), 0.7, 0.008))
+    ):
+        y = np.linspace(-0.14, long, 6) * radius
+        half = np.interp(np.arange(6), (0, 4, 5), (1.0, rng.uniform(0.6, 1.8), 0.25)) * wide * radius
+        hand = slab(np.c_[-half, y], np.c_[half, y], 0.0009, 0.0002)
+        hands.append(hand.turned(z_deg=-360 * angle).at(z=front + 0.0022 + 0.0014 * k))
+    hands.append(cylinder(0.045 * radius, 0.0075, 0.001, 20).at(z=front - 0.0003))
+    dome = np.linspace(0, np.pi / 2, 7)
+    glass = lathe(
+        [
+            (0, 0),
+            *np.c_[(radius - rim + 0.001) * np.cos(dome), 0.16 * radius * np.sin(dome)][:-1],
+            (0, 0.16 * radius),
+        ],
+        48,
+    ).at(z=max(front + 0.0085, 0.85 * deep))
+    parts = {"case": case, "paper_dial": [dial], "marks": marks, "metal_hands": hands}
+    if rng.random() < 0.4:
+        parts["glass"] = [glass]
+    parts = {name: [s.turned(x_deg=90).at(z=radius) for s in solids] for name, solids in parts.items()}
+    if rng.random() < 0.5:
+        legs = [
+            sweep(np.array([(0, 0, 0), (0, 0, 0.3), (0, 0, 0.6)]) * radius, 0.06 * radius, 8)
+            .turned(y_deg=180 + 30 * s)
+            .at(s * 0.45 * radius, -deep / 2, 0.2 * radius)
+            for s in (-1, 1)
+        ]
+        bells = [
+            lathe(
+                [
+                    (0, 0),
+                    (0.33 * radius, 0),
+                    (0.3 * radius, 0.16 * radius),
+                    (0.14 * radius, 0.28 * radius),
+                    (0, 0.31 * radius),
+                ],
+                28,
+                60,
+            )
+            .turned(y_deg=35 * s)
+            .at(s * 0.6 * radius, -deep / 2, 1.86 * radius)
+            for s in (-1, 1)
+        ]
+        handle = np.linspace(0, np.pi, 16)
+        bow = np.c_[
+            0.6 * radius * np.cos(handle), 0 * handle - deep / 2, (2.1 + 0.4 * np.sin(handle)) * radius
+        ]
+        parts["metal_bells"] = [*legs, *bells, sweep(bow, 0.035 * radius, 8)]
+    return parts
+
+
+@mesh_family("globe")
+def globe(rng: np.random.Generator) -> Parts:
+    """Globe with raised continents, tilted in a meridian ring on a turned foot."""
+    radius, tilt = rng.uniform(0.08, 0.16), rng.uniform(15, 30)
+    d = ball_directions(4)
+    field = sum(np.sin(d @ rng.normal(0, 2.2, 3) + rng.uniform(0, 6.3)) for _ in range(9))
+    land = 1 / (1 + np.exp(-12 * (field - np.quantile(field, 0.65))))
+    body = ball(radius * (1 + 0.012 * land + 0.0015 * field * land), 4)
+    a = np.linspace(-np.pi / 2, np.pi / 2, 30)
+    ring = sweep(1.1 * radius * np.c_[np.cos(a), 0 * a, np.sin(a)], 0.035 * radius, 8)
+    axis = cylinder(0.03 * radius, 2.24 * radius, 0.002, 12).at(z=-1.12 * radius)
+    stand = 0.55 * radius
+    s = np.linspace(0, 1, 20)
+    profile = radius * (0.1 + 0.5 * np.exp(-9 * s) + 0.05 * np.cos(12 * s))
+    foot = lathe([(0, 0), *np.c_[profile, s * stand], (0, stand)], 32)
+    lift = stand + 1.1 * radius
+    turned = [p.turned(y_deg=tilt).at(z=lift) for p in (body, ring, axis)]
+    return {"paper_globe": turned[:1], "metal_ring": turned[1:], "wood_foot": [foot]}
+
+
+def _frame(x: float, z: float, wide: float, deep: float, bevel: float) -> list[Solid]:
+    bars = [box(x, deep, wide, bevel, 3).at(z=s) for s in (0, z - wide)]
+    upright = box(wide, deep - 0.0006, z - 1.4 * wide, bevel, 3).at(z=0.7 * wide)
+    return bars + [upright.at(s * (x - wide - 0.0008) / 2) for s in (-1, 1)]

@@ -27,9 +27,9 @@ def lamp(rng: np.random.Generator) -> Parts:
     base = [cone(foot, foot * rng.uniform(0.5, 0.95), rng.uniform(0.012, 0.05), 0.005, 40)]
     post = height - tall * 0.4
     if floor or rng.random() < 0.5:
-        pole = cylinder(stem, post, 0.002, 16)
+        pole = cylinder(stem, post - 0.004, 0.002, 16).at(z=0.004)
     else:
-        pole = turned_post(rng, rng.uniform(0.02, 0.06), post, 28)
+        pole = turned_post(rng, rng.uniform(0.02, 0.06), post - 0.004, 28).at(z=0.004)
     spokes = [box(2 * top * 0.98, 0.004, 0.003, 0.001).turned(z_deg=60 * k) for k in range(3)]
     metal = [pole, *(s.at(z=height - 0.12 * tall + 0.0015 * k) for k, s in enumerate(spokes))]
     bulb = ball(0.03, 3).at(z=height - tall * 0.45)
@@ -45,7 +45,7 @@ def desk_lamp(rng: np.random.Generator) -> Parts:
     hip = np.array((0.0, 0.0, 0.05))
     elbow = hip + lower * _direction(-lean)
     wrist = elbow + upper * _direction(bow - lean)
-    arms, joints = [cylinder(0.009, 0.05, 0.002, 16)], []
+    arms, joints = [cylinder(0.009, 0.046, 0.002, 16).at(z=0.004)], []
     for a, b in ((hip, elbow), (elbow, wrist)):
         along = np.linspace(a, b, 4)
         for y in (-0.012, 0.012) if rng.random() < 0.7 else (0.0,):
@@ -122,7 +122,7 @@ def candle(rng: np.random.Generator) -> Parts:
     holder.append(cone(reach, reach * rng.uniform(0.85, 1), 0.012, 0.003, 48))
     for x, y in spots:
         tall, lift = rng.uniform(0.04, 0.22), 0.012 + rng.uniform(0, 0.05)
-        holder.append(cone(radius * 1.25, radius * 1.2, lift, 0.002, 24).at(x, y))
+        holder.append(cone(radius * 1.25, radius * 1.2, lift - 0.004, 0.002, 24).at(x, y, 0.004))
         body = lathe(
             [
                 (0, 0),

@@ -43,7 +43,7 @@ def potted_plant(rng: np.random.Generator) -> Parts:
     turns, places = [], []
     budget = int(6000 / max(len(leaf.faces), 1) / count)
     for path in paths:
-        for k in rng.integers(2, 9, size=min(int(rng.integers(4, 9)), max(budget, 2))):
+        for k in rng.integers(2, 9, size=min(int(rng.integers(4, 9)), max(budget, 1))):
             turn = rotation_matrix(rng.normal(0, 25), rng.uniform(-60, 25), rng.uniform(0, 360))
             turns.append(turn * rng.uniform(0.5, 1.2))
             places.append(path[k])
@@ -97,7 +97,7 @@ def cactus(rng: np.random.Generator) -> Parts:
     places = np.c_[r * np.cos(on_rib), r * np.sin(on_rib), level * height + top - 0.03]
     away = np.c_[np.cos(on_rib), np.sin(on_rib), 2.2 * level - 1]
     away += rng.normal(0, 0.35, away.shape)
-    spine = cone(0.0007, 0.0002, thick * rng.uniform(0.2, 0.5), 0.0001, 4)
+    spine = lathe([(0.0007, 0), (0.0001, thick * rng.uniform(0.2, 0.5))], 4)
     return {
         "pot": [pot],
         "soil": [soil],
@@ -207,7 +207,7 @@ def leaf_rand(rng: np.random.Generator, kind: int, length: float) -> Solid:
     """
     fold, droop = rng.uniform(0.1, 0.6), rng.uniform(0.1, 0.7)
     if kind == 5:
-        return _compound(_grid_leaf(_oval(np.linspace(0, 1, 6)), fold, droop, 3), length, 9)
+        return _compound(_grid_leaf(_oval(np.linspace(0, 1, 5)), fold, droop, 3), length, 7)
     if kind == 7:
         needle = cone(0.008, 0.002, 0.34, 0.001, 4)
         k = np.arange(26)

@@ -1,12 +1,13 @@
-"""Seats and beds, and the soft things that lie on them."""
+"""Chairs and stools."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from fsid.assets.meshes.soft import pillow
 from fsid.assets.meshes.tables import turned_post
 from fsid.assets.registry import Parts, mesh_family
-from fsid.assets.solids import Solid, ball, ball_directions, box, cone, cylinder, sheet, smooth_normals, sweep
+from fsid.assets.solids import box, cone, cylinder, sheet, sweep
 
 
 @mesh_family("dining_chair")
@@ -52,98 +53,74 @@ def stool(rng: np.random.Generator) -> Parts:
     return {"seat": [cylinder(radius, thick, thick * 0.4, 48).at(z=z - thick)], "legs": legs, "ring": [ring]}
 
 
-@mesh_family("couch")
-def couch(rng: np.random.Generator) -> Parts:
-    """Upholstered couch or armchair: base, arms, back, one to three seat and back cushions, feet."""
-    seats = int(rng.integers(1, 4))
-    wide, depth, arm = rng.uniform(0.5, 0.7), rng.uniform(0.75, 0.95), rng.uniform(0.08, 0.2)
-    base, seat, back = rng.uniform(0.2, 0.3), rng.uniform(0.12, 0.18), rng.uniform(0.35, 0.5)
-    x = seats * wide + 2 * arm
-    soft = rng.uniform(0.02, 0.06)
-    body = [box(x, depth, base, 0.03, 3).at(z=0.1)]
-    body += [
-        box(arm, depth, base + rng.uniform(0.15, 0.3), soft, 4).at(s * (x - arm) / 2, 0, 0.1) for s in (-1, 1)
-    ]
-    body += [box(x, 0.16, base + back, soft, 4).at(0, depth / 2 - 0.08, 0.1)]
-    cushions = []
-    for k in range(seats):
-        cx = (k - (seats - 1) / 2) * wide
-        cushions.append(pillow(wide - 0.01, depth - 0.2, seat, 3.5).at(cx, -0.09, 0.1 + base + seat * 0.42))
-        lean = pillow(wide - 0.02, 0.18, back, 3.0).turned(x_deg=-rng.uniform(6, 16))
-        cushions.append(lean.at(cx, depth / 2 - 0.24, 0.1 + base + seat * 0.8 + back / 2))
-    feet = [
-        cone(0.018, 0.026, 0.11, 0.003, 16).at(sx * (x / 2 - 0.08), sy * (depth / 2 - 0.08))
-        for sx in (-1, 1)
-        for sy in (-1, 1)
-    ]
-    return {"body": body, "cushions": cushions, "feet": feet}
-
-
-@mesh_family("bed")
-def bed(rng: np.random.Generator) -> Parts:
-    """Frame with headboard, mattress, blanket with folds, pillows."""
-    x, y = rng.uniform(0.9, 1.8), rng.uniform(1.9, 2.1)
-    frame_z, mattress = rng.uniform(0.2, 0.35), rng.uniform(0.16, 0.26)
-    frame = [box(x, y, frame_z, 0.012), box(x, 0.05, rng.uniform(0.7, 1.1), 0.015, 3).at(0, y / 2)]
-    count = 1 if x < 1.2 else 2
-    pillows = []
-    for k in range(count):
-        soft = pillow(0.55 * min(1, x / count / 0.6), 0.4, 0.16, 2.6).turned(z_deg=rng.uniform(-12, 12))
-        pillows.append(soft.at((k - (count - 1) / 2) * x / count, y / 2 - 0.3, frame_z + mattress + 0.06))
-    cover = box(x - 0.04, y - 0.06, mattress, 0.05, 4).at(z=frame_z)
-    blanket = _blanket(rng, x + 0.03, y * rng.uniform(0.5, 0.7), mattress).at(0, -y * 0.14, frame_z + 0.012)
-    return {"frame": frame, "mattress": [cover], "pillows": pillows, "blanket": [blanket]}
-
-
-@mesh_family("cushion")
-def cushion(rng: np.random.Generator) -> Parts:
-    """Square to oblong throw cushion with piping along its seam."""
-    x, y, z = rng.uniform(0.3, 0.6), rng.uniform(0.3, 0.5), rng.uniform(0.1, 0.2)
-    pinch = rng.uniform(2.6, 6)
-    angle = np.linspace(0, 2 * np.pi, 96, endpoint=False)
-    c, s = np.cos(angle), np.sin(angle)
-    edge = np.c_[c, s] / (np.abs(c) ** pinch + np.abs(s) ** pinch)[:, None] ** (1 / pinch)
-    seam = sweep(np.c_[edge * (x / 2, y / 2), np.zeros(96)], rng.uniform(0.003, 0.007), 8, closed=True)
-    return {"cover": [pillow(x, y, z, pinch, rng, 4)], "piping": [seam]}
-
-
-def pillow(
-    x: float, y: float, z: float, pinch: float, rng: np.random.Generator | None = None, level: int = 3
-) -> Solid:
-    """Superellipse outline of exponent `pinch` with a puffed, round section; wrinkled when `rng` is given."""
-    d = ball_directions(level)
-    flat = np.hypot(d[:, 0], d[:, 1]) + 1e-9
-    outline = flat / (np.abs(d[:, 0]) ** pinch + np.abs(d[:, 1]) ** pinch + 1e-12) ** (1 / pinch)
-    stretch = 1 + (outline - 1) * flat**2
-    radii = np.ones(len(d))
-    if rng is not None:
-        for _ in range(6):
-            wave = rng.normal(0, 5, 3)
-            radii += 0.012 * np.sin(d @ wave + rng.uniform(0, 6.3))
-    solid = ball(radii, level)
-    shaped = Solid(solid.vertices * np.c_[stretch, stretch, np.ones(len(d))], solid.normals, solid.faces)
-    return _renormalised(shaped.stretched(x / 2, y / 2, z / 2))
-
-
-def _renormalised(solid: Solid) -> Solid:
-    return Solid(solid.vertices, smooth_normals(solid.vertices, solid.faces), solid.faces)
-
-
-def _blanket(rng: np.random.Generator, x: float, y: float, drop: float) -> Solid:
-    rows, cols = 36, 60
-    across = np.linspace(-1, 1, cols) * (x / 2 + drop * 0.8)
-    over = np.maximum(np.abs(across) - x / 2, 0)
-    u = np.sign(across) * np.minimum(np.abs(across), x / 2 + 0.004)
-    v = np.linspace(-y / 2, y / 2, rows)
-    height = np.zeros((rows, cols))
-    for _ in range(9):
-        k = rng.normal(0, 9, 2)
-        height += rng.uniform(0.001, 0.005) * np.sin(
-            k[0] * across[None] + k[1] * v[:, None] + rng.uniform(0, 6.3)
-        )
-    fold = 0.5 + 0.5 * np.sin(v * rng.uniform(25, 45))[:, None]
-    side = np.sign(across)[None] * (np.minimum(over, 0.06) * fold * 0.35 + np.abs(height))
-    points = np.stack(
-        [u + side, np.broadcast_to(v[:, None], (rows, cols)), drop + 0.012 + height - over], axis=-1
+@mesh_family("office_chair")
+def office_chair(rng: np.random.Generator) -> Parts:
+    """Swivel chair: five castors on a star, gas column, padded seat, bent back in cloth or mesh, arms."""
+    x, z, splay = rng.uniform(0.42, 0.52), rng.uniform(0.42, 0.55), rng.uniform(0.26, 0.33)
+    s = np.linspace(0, 1, 8)
+    leg = np.c_[0.03 + splay * s, 0 * s, 0.11 - 0.045 * s]
+    spider = sweep(leg, np.linspace(0.022, 0.014, 8), 10)
+    wheel = cylinder(0.027, 0.018, 0.004, 20)
+    metal = [cylinder(0.028, z - 0.14, 0.003, 24).at(z=0.1), cylinder(0.05, 0.08, 0.006, 24).at(z=0.07)]
+    castors = []
+    for k in range(5):
+        metal.append(spider.turned(z_deg=72 * k))
+        for side in (-0.012, 0.012):
+            rolled = wheel.at(z=-0.009).turned(x_deg=90).at(splay + 0.03, side, 0.027)
+            castors.append(rolled.turned(z_deg=72 * k))
+    seat = pillow(x, x * rng.uniform(0.9, 1.05), rng.uniform(0.09, 0.14), rng.uniform(2.6, 4.5), rng, 4).at(
+        z=z
     )
-    return sheet(points, 0.012)
+    tall, lean, hollow = rng.uniform(0.4, 0.75), rng.uniform(2, 16), rng.uniform(0.03, 0.09)
+    u, v = np.meshgrid(np.linspace(-1, 1, 16), np.linspace(0, 1, 18))
+    narrow = 1 - rng.uniform(0, 0.35) * v**3
+    bow = hollow * (1 - u**2) - 0.03 * np.sin(np.pi * v) - 0.02
+    points = np.stack([u * narrow * x / 2, bow, 0.12 + v * tall], axis=-1)
+    back = sheet(points, rng.uniform(0.02, 0.05)).turned(x_deg=-lean).at(0, x * 0.46, z)
+    stem = np.c_[0 * s, 0.1 + x * 0.42 * s**0.5, z - 0.05 + 0.32 * s**2]
+    metal.append(sweep(stem, 0.016, 10))
+    parts = {"metal_base": metal, "rubber_castors": castors, "cloth_seat": [seat], "cloth_back": [back]}
+    if rng.random() < 0.7:
+        t = np.linspace(0, np.pi / 2, 8)
+        bend = np.c_[0 * t, -0.04 - 0.05 * np.sin(t), 0.16 + 0.06 * np.cos(t)]
+        path = np.vstack([(0, 0.16, 0.22), bend, (0, -0.06, 0.0)])
+        rest = box(0.06, rng.uniform(0.2, 0.28), 0.03, 0.012, 3).at(0, 0.05, 0.205)
+        sides = [
+            p.at(side * (x / 2 + 0.035), 0, z) for side in (-1, 1) for p in (sweep(path, 0.013, 10), rest)
+        ]
+        parts["plastic_arms"] = sides
+    return parts
+
+
+@mesh_family("armchair")
+def armchair(rng: np.random.Generator) -> Parts:
+    """Easy chair of bent wood or a wing chair: sloped frame, loose seat and back cushions, arm rests."""
+    x, y, z = rng.uniform(0.52, 0.68), rng.uniform(0.52, 0.66), rng.uniform(0.28, 0.38)
+    tall, lean, bar = rng.uniform(0.45, 0.75), rng.uniform(10, 26), rng.uniform(0.014, 0.024)
+    arm = z + rng.uniform(0.16, 0.26)
+    s = np.linspace(0, 1, 18)
+    frame = []
+    for side in (-1, 1):
+        bend = rng.uniform(0.05, 0.14)
+        run = np.c_[0 * s, (s - 0.5) * (y + 0.1), arm - bend * (2 * s - 1) ** 4 + 0.02 * np.sin(3 * s)]
+        front = np.c_[0 * s[:6], -0.46 * y + 0.02 * s[:6], s[:6] / s[5] * (arm - 0.03)]
+        rear = np.c_[0 * s[:6], 0.44 * y - 0.05 * s[:6], s[:6] / s[5] * (arm - 0.03)]
+        for path, wide in ((run, 1.7), (front, 1.0), (rear, 1.0)):
+            frame.append(sweep(path, bar, 10).stretched(wide, 1, 1).at(side * (x / 2 + bar)))
+        rail = box(2 * bar, y, 2.2 * bar, 0.4 * bar).turned(x_deg=6)
+        frame.append(rail.at(side * (x / 2 + bar), 0, z - 0.06))
+    frame += [box(x, 0.03, 0.045, 0.006).at(0, k * 0.42 * y, z - 0.07 - 0.02 * k) for k in (-1, 1)]
+    slats = [
+        box(0.035, 0.014, tall, 0.004).at(h * x, 0.02) for h in np.linspace(-0.42, 0.42, rng.integers(4, 9))
+    ]
+    slats += [box(x, 0.022, 0.05, 0.006).at(0, 0.022, tall - 0.03)]
+    back = [p.turned(x_deg=-lean).at(0, 0.4 * y, z - 0.02) for p in slats]
+    thick = rng.uniform(0.1, 0.16)
+    cushions = [
+        pillow(x - 0.01, y * 0.92, thick, rng.uniform(3, 5), rng, 4)
+        .turned(x_deg=4)
+        .at(0, -0.02, z + 0.35 * thick)
+    ]
+    rest = pillow(x - 0.02, thick, tall * 0.92, rng.uniform(2.8, 4), rng, 4).turned(x_deg=-lean)
+    cushions.append(rest.at(0, 0.4 * y - 0.05 + 0.1 * tall, z + 0.55 * thick + 0.46 * tall))
+    return {"wood_frame": frame, "wood_back": back, "cloth_cushions": cushions}

@@ -18,8 +18,8 @@ def table(rng: np.random.Generator) -> Parts:
     leg = _leg(rng, width, z - plate)
     legs = [leg.at(sx * dx, sy * dy) for sx in (-1, 1) for sy in (-1, 1)]
     drop = rng.uniform(0.05, 0.1)
-    apron = [box(2 * dx, 0.02, drop).at(0, s * dy, z - plate - drop) for s in (-1, 1)]
-    apron += [box(0.02, 2 * dy, drop).at(s * dx, 0, z - plate - drop) for s in (-1, 1)]
+    apron = [box(2 * dx, 0.02, drop).at(0, s * dy, z - plate - drop + 0.0008) for s in (-1, 1)]
+    apron += [box(0.02, 2 * dy, drop).at(s * dx, 0, z - plate - drop + 0.0016) for s in (-1, 1)]
     top = box(x, y, plate, rng.uniform(0.002, 0.015), 3).at(z=z - plate)
     return {"top": [top], "apron": apron, "legs": legs}
 
@@ -30,7 +30,7 @@ def round_table(rng: np.random.Generator) -> Parts:
     radius, z = rng.uniform(0.22, 0.6), rng.uniform(0.4, 0.8)
     plate, column = rng.uniform(0.015, 0.04), rng.uniform(0.02, 0.05)
     top = cylinder(radius, plate, rng.uniform(0.003, 0.014), 56).at(z=z - plate)
-    shaft = turned_post(rng, column, z - plate, 24)
+    shaft = turned_post(rng, column, z - plate - 0.003, 24).at(z=0.003)
     if rng.random() < 0.5:
         foot = [cone(radius * 0.6, column * 1.4, rng.uniform(0.02, 0.06), 0.008, 48)]
     else:
