@@ -10,6 +10,7 @@ from fsid.cli.main import main
 from fsid.errors import FsidError
 from fsid.sensor import (
     Layout,
+    NoiseTerms,
     Raw,
     calibrate,
     load_profile,
@@ -177,7 +178,8 @@ def test_read_noise_that_reaches_zero_is_said_and_still_found(tmp_path, rng):
         kind: write_burst(tmp_path / kind, rng, scene(light), 12800, 10)
         for kind, light in (("light", 0.9), ("dark", 0.0))
     }
-    found = calibrate(paths["light"], name="mine", dark=paths["dark"])
+    found = calibrate(paths["light"], name="mine", dark=paths["dark"], terms=True)
+    assert found.profile.terms == NoiseTerms()
     assert any("reaches DN 0" in note for note in found.notes)
     np.testing.assert_allclose(found.profile.sigma2[0], PROFILE.level(12800).sigma2, rtol=0.04)
     np.testing.assert_allclose(found.profile.measured.black, 64, atol=2)

@@ -22,12 +22,11 @@ from fsid.sensor.camera_profile import MONO, CameraProfile, Measurement
 from fsid.sensor.colour import published_matrices
 from fsid.sensor.frames import Frame, FrameSet, Layout, bursts, find_frames
 from fsid.sensor.temporal import TemporalStatistics
-from fsid.sensor.terms_fit import DarkFinding, dark_finding, fit_terms, prnu_of
+from fsid.sensor.terms_fit import CUT_OFF, DarkFinding, dark_finding, fit_terms, prnu_of
 
 MIN_FRAMES = 3  # of one ISO; a variance from two is one number per pixel, and a defect looks like noise
 DARK_LEVEL = 0.05  # of the range, above which a dark frame saw light
 DARK_CONTRAST = 0.02  # of the range between blocks, above which a dark frame shows a picture
-CUT_OFF = 0.002  # of the dark values at 0, above which the noise that was cut off is worth a note
 UNCERTAIN = 0.02  # relative standard error of k that deserves a note
 _METHOD = "fsid calibrate: weighted line through pooled temporal variances per CFA site (sensor/calibrate.py)"
 

@@ -23,6 +23,7 @@ from fsid.sensor.temporal import TemporalStatistics
 from fsid.sensor.terms import NoiseTerms
 
 FLAT = 0.1  # contrast of an evenly lit burst, relative to its signal; beyond it texture looks like PRNU
+CUT_OFF = 0.002  # of the dark values at DN 0, from which on noise is no longer symmetric
 FAR = 10.0  # robust standard deviations: a defective pixel
 _STANDING_OUT = 0.02  # share of the noise from which on a term is worth having
 _GAUSS_MAD = 0.6745  # median absolute deviation of a standard normal number
@@ -40,9 +41,9 @@ class DarkFinding:
 
 
 def dark_finding(stats: TemporalStatistics, iso: float, exposure_s: float) -> DarkFinding | None:
-    """The terms that dark frames show; None where their noise drowns in the rounding of the converter."""
+    """The terms that dark frames show; None where their noise drowns in rounding or is cut off at DN 0."""
     found = stats.read_statistics()
-    if found.pixel_dn2 < RESOLVED_DN2:
+    if found.pixel_dn2 < RESOLVED_DN2 or stats.zero_share > CUT_OFF:
         return None
     mean = stats.mean()
     left = found.pixel_dn2 / stats.frames
