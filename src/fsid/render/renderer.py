@@ -33,6 +33,7 @@ from fsid.render.lamps import lamps_of
 from fsid.render.layers import Bake, Layer, LayerStore
 from fsid.render.programs import load_program
 from fsid.render.quality import QUALITIES, tap_table
+from fsid.render.reflectance import reflectance_table
 from fsid.render.room import Room, light_room, light_sky
 from fsid.render.shadows import COLUMNS, ShadowPlan, Source, plan_shadows
 from fsid.render.shadows import NEAR_M as SHADOW_NEAR_M
@@ -98,6 +99,9 @@ class Renderer:
         taps = tap_table(self._quality)
         self._taps = context.texture((taps.shape[1], taps.shape[0]), 2, taps.tobytes(), dtype="f4")
         self._taps.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        shares = reflectance_table()
+        self._reflectance = context.texture(shares.shape[1::-1], 2, shares.tobytes(), dtype="f4")
+        self._reflectance.repeat_x = self._reflectance.repeat_y = False
         for program in (self._block_depth, self._occlusion):
             _set(program, stride=2 * self._grid, taps=self._quality.occlusion_taps)
 
@@ -324,6 +328,7 @@ class Renderer:
         self._layers.use(0, 1)
         self._atlas.use(compare_unit=2, moments_unit=3)
         self._taps.use(7)
+        self._reflectance.use(14)
         buffers.use()
         red, blue = camera.chromatic_aberration
         for aberration, colours in _colour_passes(red, blue):

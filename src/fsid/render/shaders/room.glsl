@@ -28,10 +28,6 @@ vec3 mirrored(vec3 position, vec3 r, float alpha) {
     return mix(wall, cube(mean_sides, r), smoothstep(0.0, 0.4, alpha));
 }
 
-// Share of the surroundings that a surface reflects specularly: scale and offset of f0 (Karis 2014,
-// analytic form after Lazarov 2013).
-vec2 mirror_share(float roughness, float nv) {
-    vec4 r = roughness * vec4(-1.0, -0.0275, -0.572, 0.022) + vec4(1.0, 0.0425, 1.04, -0.04);
-    float a = min(r.x * r.x, exp2(-9.28 * nv)) * r.x + r.y;
-    return max(vec2(-1.04, 1.04) * a + r.zw, 0.0);
-}
+// Share of the surroundings that a surface reflects specularly: scale and offset of f0 (fsid.render.reflectance).
+layout(binding = 14) uniform sampler2D reflectance;
+vec2 mirror_share(float roughness, float nv) { return textureLod(reflectance, vec2(nv, roughness), 0.0).xy; }

@@ -197,7 +197,7 @@ vec3 radiance(Sample p, Surface s, Matter m, float spread) {
 #endif
     vec3 result = sum + openness(p.position, p.depth) * surroundings;
 #if GLASS
-    float passes = s.transmission * (1.0 - m.metallic) * (1.0 - min(mirror.g, 1.0));
+    float passes = s.transmission * (1.0 - m.metallic) * (1.0 - mirror.g) * (1.0 - mirror.g);
     result += passes * m.albedo * seen_through(p, s, n, v);
 #endif
     return result;

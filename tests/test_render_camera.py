@@ -1,0 +1,226 @@
+"""Laws of the camera: distortion, vignetting, aberration, blur, and flow against their closed formulas."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.ndimage import center_of_mass, map_coordinates
+
+from fsid.errors import FsidError
+from fsid.render import Frame, Renderer
+from fsid.render.camera import distorted, lens_of, undistorted
+from fsid.render.drawable import View
+from fsid.render.flow import flow_between
+from fsid.scene import SceneConfig, sample
+from fsid.scene.model import Camera, Distortion, Motion, Transform
+from render_scenes import FROM_ABOVE, bake_plain, block, grid, lambertian, point_light, sphere, view
+
+ONE = (1.0, 1.0, 1.0)
+BARREL = Distortion("brown-conrady", (-0.25, 0.06, 0.002, -0.001, 0.0))
+PINCUSHION = Distortion("brown-conrady", (0.12, 0.01, 0.0, 0.0, 0.0))
+FISHEYE = Distortion("fisheye", (0.05, -0.01, 0.002, 0.0))
+LENSES = {"barrel": BARREL, "pincushion": PINCUSHION, "fisheye": FISHEYE}
+LABEL_SAMPLE = 0.75
+"""Of the 2 x 2 samples of a pixel, that of depth, normal and id lies here."""
+
+
+@pytest.fixture(scope="module")
+def renderer() -> Iterator[Renderer]:
+    with Renderer(texture_size=64) as renderer:
+        yield renderer
+
+
+def draw(renderer: Renderer, what: View) -> Frame:
+    return renderer.draw(what, bake=bake_plain)
+
+
+def at(x: float, y: float, z: float = 0.0) -> Transform:
+    return Transform((x, y, z), (0.0, 0.0, 0.0), ONE)
+
+
+@pytest.mark.parametrize("name", LENSES)
+def test_points_are_where_the_formula_says(renderer: Renderer, name: str) -> None:
+    """Small discs in a grid: the centre of each, by its id, within 0.2 pixel of OpenCV's formula."""
+    camera = replace(FROM_ABOVE, fov_deg=70.0, width=320, height=240, distortion=LENSES[name])
+    places = [(x, y) for x in (-0.9, -0.4, 0.0, 0.5, 1.0) for y in (-0.7, 0.1, 0.6)]
+    discs = [lambertian(sphere(0.06, 32), at=at(x, y), object_id=i) for i, (x, y) in enumerate(places)]
+    flat = [replace(disc, transform=replace(disc.transform, scale=(1.0, 1.0, 0.001))) for disc in discs]
+    frame = draw(renderer, view(*flat, camera=camera))
+    focal_px = 160 / np.tan(np.radians(35))
+    for i, (x, y) in enumerate(places):
+        row, column = center_of_mass(frame.object_id == i)
+        seen = distorted(LENSES[name], np.array([x, -y]) / 2.0) * focal_px + (160, 120)
+        np.testing.assert_allclose((column + LABEL_SAMPLE, row + LABEL_SAMPLE), seen, atol=0.2)
+
+
+@pytest.mark.parametrize("name", LENSES)
+def test_depth_and_radiance_agree_with_the_bent_rays(renderer: Renderer, name: str) -> None:
+    """A slanted plane: depth is that of the labels' ray, light that of the pixel, everywhere."""
+    camera = replace(
+        FROM_ABOVE, position_m=(0.3, -1.5, 1.2), target_m=(0.1, -0.2, 0.0), distortion=LENSES[name]
+    )
+    light = point_light((0.3, -0.2, 1.0), intensity=3.0)
+    frame = draw(renderer, view(lambertian(grid(60.0)), lights=(light,), camera=camera))
+    depth, _ = plane_hits(camera, LABEL_SAMPLE)
+    near = (depth > 0) & (depth < 8)
+    np.testing.assert_allclose(frame.depth[near], depth[near], rtol=2e-5)
+    _, points = plane_hits(camera, 0.5)
+    to = np.array(light.position_m) - points
+    expected = 0.5 / np.pi * 3.0 * to[..., 2] / np.linalg.norm(to, axis=-1) ** 3
+    np.testing.assert_allclose(frame.radiance[near, 0], expected[near], rtol=0.015)
+
+
+def plane_hits(camera: Camera, sample_at: float) -> tuple[np.ndarray, np.ndarray]:
+    """Depth (H, W) and points (H, W, 3) of z = 0 behind each pixel."""
+    lens = lens_of(camera)
+    x, y = np.meshgrid(np.arange(camera.width) + sample_at, np.arange(camera.height) + sample_at)
+    image = (np.stack([x, y], -1) / (camera.width / 2, camera.height / 2) - 1) / lens.focal
+    p = undistorted(camera.distortion, image)
+    rays = np.stack([p[..., 0], -p[..., 1], np.ones_like(x)], -1) @ lens.rotation
+    depth = -lens.position[2] / rays[..., 2]
+    return depth, lens.position + rays * depth[..., None]
+
+
+@pytest.mark.parametrize("name", LENSES)
+def test_the_lens_can_be_inverted(name: str) -> None:
+    points = np.random.default_rng(0).uniform(-0.8, 0.8, (200, 2))
+    np.testing.assert_allclose(undistorted(LENSES[name], distorted(LENSES[name], points)), points, atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("lens", "message"),
+    [
+        (Distortion("brown-conrady", (-0.9, 0.0, 0.0, 0.0, 0.0)), "fold the image"),
+        (Distortion("brown-conrady", (0.1,)), "needs 5 coefficients"),
+        (Distortion("spherical", (0.1,)), "'brown-conrady' or 'fisheye'"),
+    ],
+)
+def test_a_lens_that_cannot_be_is_named(lens: Distortion, message: str) -> None:
+    with pytest.raises(FsidError, match=message):
+        lens_of(replace(FROM_ABOVE, fov_deg=90.0, distortion=lens))
+
+
+def test_vignetting_is_its_polynomial(renderer: Renderer) -> None:
+    what = view(lambertian(grid(8.0)), ambient=0.5)
+    flat = draw(renderer, what).radiance[..., 0]
+    dim = draw(renderer, replace(what, camera=replace(FROM_ABOVE, vignetting=(-0.3, 0.1, -0.2)))).radiance
+    x = (np.arange(96) + 0.5) / 48 - 1
+    r2 = (x[:, None] ** 2 + x**2) / 2
+    np.testing.assert_allclose(dim[..., 0] / flat, 1 - 0.3 * r2 + 0.1 * r2**2 - 0.2 * r2**3, rtol=1e-4)
+
+
+def test_aberration_magnifies_red_and_blue(renderer: Renderer) -> None:
+    """A bright square: its edges in red and blue lie (1 + a) times as far from the centre as in green."""
+    square = lambertian(grid(1.4), (0.9, 0.9, 0.9))
+    camera = replace(FROM_ABOVE, width=240, height=240, chromatic_aberration=(0.02, -0.03))
+    rows = draw(renderer, view(square, ambient=1.0, camera=camera)).radiance[120]
+    widths = rows.sum(0) / rows[120]
+    np.testing.assert_allclose(widths[[0, 2]] / widths[1], (1.02, 0.97), atol=0.006)
+
+
+def moved_view(**camera: object) -> View:
+    light = point_light((0.3, 0.2, 1.8), intensity=4.0, radius_m=0.05)
+    ball = lambertian(sphere(0.25, 64), at=at(-0.3, 0.1, 0.3), object_id=1)
+    ball = replace(ball, motion=Motion(velocity_m_s=(0.8, 0.2, 0.0), spin_deg_s=(0.0, 0.0, 60.0)))
+    slab = lambertian(block((0.4, 0.3, 0.3)), at=at(0.4, -0.2), object_id=2)
+    what = view(lambertian(grid(8.0)), ball, slab, lights=(light,), ambient=0.1)
+    return replace(what, camera=replace(FROM_ABOVE, **camera))
+
+
+@pytest.mark.parametrize("lens", [None, BARREL])
+def test_flow_meets_the_same_point_in_the_other_image(renderer: Renderer, lens: Distortion | None) -> None:
+    """Where the point is not hidden there: the other image has the same object at the predicted depth."""
+    first = moved_view(width=160, height=160, distortion=lens)
+    second = replace(first, camera=replace(first.camera, position_m=(0.15, -0.1, 1.9), time_s=0.2))
+    a, b = draw(renderer, first), draw(renderer, second)
+    here, there = ((v.camera, lens_of(v.camera), v.camera.time_s) for v in (first, second))
+    flow = flow_between(a, first.drawables, here, there, LABEL_SAMPLE)
+    back = flow_between(b, first.drawables, there, here, LABEL_SAMPLE)
+    rows, columns = np.mgrid[0:160, 0:160]
+    y, x = rows + flow[..., 1], columns + flow[..., 0]
+    inside = (x > 1) & (x < 158) & (y > 1) & (y < 158)
+    meets = np.stack([map_coordinates(back[..., i], [y, x], order=1, mode="nearest") for i in (0, 1)], -1)
+    same = map_coordinates(b.object_id.astype(float), [y, x], order=0, mode="nearest") == a.object_id
+    error = np.linalg.norm(flow + meets, axis=-1)[inside & same]
+    assert (inside & same).mean() > 0.7
+    assert np.quantile(error, 0.95) < 0.05
+    ball = a.object_id == 1
+    assert np.linalg.norm(flow[ball], axis=-1).mean() > 5
+
+
+def test_flow_of_a_still_camera_is_zero_and_nan_outside(renderer: Renderer) -> None:
+    what = view(lambertian(sphere(0.3)))
+    frame = draw(renderer, what)
+    here = (what.camera, lens_of(what.camera), 0.0)
+    flow = flow_between(frame, what.drawables, here, here, LABEL_SAMPLE)
+    assert np.abs(flow[frame.object_id == 0]).max() < 1e-4
+    assert np.isnan(flow[frame.object_id == -1]).all()
+
+
+def test_render_gives_flow_to_another_camera(renderer: Renderer) -> None:
+    scene = sample(SceneConfig(objects=(2, 2)), 0, width=48, height=32)
+    scene = replace(scene, cameras=(scene.cameras[0],) * 2)
+    frame = renderer.render(scene, 0, flow_to=1)
+    assert frame.flow is not None
+    assert np.abs(frame.flow[np.isfinite(frame.depth)]).max() < 1e-3
+    with pytest.raises(FsidError, match="flow_to 7"):
+        renderer.render(scene, 0, flow_to=7)
+
+
+def test_a_still_scene_is_not_blurred(renderer: Renderer) -> None:
+    what = view(lambertian(sphere(0.3)), lights=(point_light((0.3, 0.2, 1.8)),))
+    sharp = draw(renderer, what).radiance
+    open_shutter = draw(renderer, replace(what, camera=replace(FROM_ABOVE, exposure_s=0.5))).radiance
+    assert (sharp == open_shutter).all()
+
+
+def test_motion_blur_is_a_box_along_the_path(renderer: Renderer) -> None:
+    """A bright disc that moves d pixels during the exposure: a ramp of that length at both ends, no ghosts.
+
+    The steps of the ramp are what is left of the single images: below 3 % of the disc's radiance.
+    """
+    disc = lambertian(sphere(0.3, 96), (0.9, 0.9, 0.9))
+    disc = replace(disc, motion=Motion(velocity_m_s=(1.0, 0.0, 0.0)))
+    camera = replace(FROM_ABOVE, width=192, height=192, exposure_s=0.3)
+    frame = draw(renderer, view(disc, ambient=1.0, camera=camera))
+    row = frame.radiance[96, :, 0] / frame.radiance[96, :, 0].max()
+    path_px = 0.3 * 96 / np.tan(np.radians(30)) / 2
+    low, high = (np.interp(level, row[:96], np.arange(96)) for level in (0.05, 0.95))
+    assert 0.85 * 0.9 * path_px < high - low < 1.2 * 0.9 * path_px
+    ramp = row[int(low) : int(high)]
+    assert np.diff(ramp).min() > -0.005
+    assert np.abs(np.diff(ramp, 2)).max() < 0.03
+    assert (frame.object_id == draw(renderer, view(disc)).object_id.repeat(2, 0).repeat(2, 1)).mean() > 0.97
+
+
+def test_depth_of_field_blurs_by_the_circle_of_confusion(renderer: Renderer) -> None:
+    """Sharp at the focus; else an edge is as wide as a disc of diameter A f |1/F - 1/z|."""
+    camera = replace(FROM_ABOVE, width=192, height=192, aperture_m=0.06, focus_m=2.0)
+    for height, aperture in ((0.0, 0.06), (0.7, 0.06)):
+        edge = lambertian(grid(4.0), (0.9, 0.9, 0.9), at=at(2.0, 0.0, height))
+        row = draw(renderer, view(edge, ambient=1.0, camera=camera)).radiance[96, :, 0]
+        row = row / row[150]
+        low, high = (np.interp(level, row, np.arange(192)) for level in (0.1, 0.9))
+        diameter = aperture * (96 / np.tan(np.radians(30))) * abs(1 / 2.0 - 1 / (2.0 - height))
+        assert abs((high - low) - 0.687 * diameter) < 0.25 * 0.687 * diameter + 1.0
+        assert np.diff(row).min() > -0.01
+
+
+def test_a_camera_that_makes_no_sense_is_named() -> None:
+    for change in ({"focus_m": 0.0}, {"aperture_m": -1.0}, {"exposure_s": -1.0}):
+        with pytest.raises(FsidError, match=r"scene\.cameras"):
+            lens_of(replace(FROM_ABOVE, **change))
+    with pytest.raises(FsidError, match="chromatic_aberration"):
+        lens_of(replace(FROM_ABOVE, chromatic_aberration=(0.2, 0.0)))
+
+
+def test_albedo_is_flat_where_the_material_is(renderer: Renderer) -> None:
+    """Labels do not depend on the lens: a plain floor has one albedo everywhere."""
+    for lens in (None, *LENSES.values()):
+        camera = replace(FROM_ABOVE, distortion=lens)
+        frame = draw(renderer, view(lambertian(grid(40.0), (0.2, 0.5, 0.7)), camera=camera))
+        np.testing.assert_allclose(frame.albedo, np.broadcast_to((0.2, 0.5, 0.7), (96, 96, 3)), atol=1e-3)
+        np.testing.assert_allclose(frame.normal[..., 2], 1.0, atol=1e-3)

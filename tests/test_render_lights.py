@@ -1,0 +1,313 @@
+"""Laws of lights and lobes: sun, area, shining surfaces, sky; energy is conserved by every lobe."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fsid.errors import FsidError
+from fsid.render import Frame, Renderer
+from fsid.render.drawable import Drawable, View, background_drawable, panel_drawable, view_of
+from fsid.render.sky import panorama
+from fsid.scene import SceneConfig, sample
+from fsid.scene.model import Background, Camera, Light, Sky, Transform, Vec3
+from render_scenes import (
+    FROM_ABOVE,
+    STILL,
+    bake_plain,
+    block,
+    grid,
+    lambertian,
+    pixel_rays,
+    plain,
+    point_light,
+    sphere,
+    view,
+)
+
+ONE = (1.0, 1.0, 1.0)
+SMALL = replace(FROM_ABOVE, width=32, height=32)
+
+
+@pytest.fixture(scope="module")
+def renderer() -> Iterator[Renderer]:
+    with Renderer(texture_size=64) as renderer:
+        yield renderer
+
+
+def draw(renderer: Renderer, what: View) -> Frame:
+    return renderer.draw(what, bake=bake_plain)
+
+
+def floor_points(camera: Camera) -> np.ndarray:
+    """(H, W, 3) points of z = 0 behind each pixel's centre."""
+    rays, rotation = pixel_rays(camera)
+    half_sample = 0.25 / camera.width * 2 * np.tan(np.radians(camera.fov_deg) / 2)
+    rays = rays - half_sample * (rotation[0] - rotation[1])
+    origin = np.array(camera.position_m)
+    return origin + rays * (-origin[2] / rays[..., 2:])
+
+
+def sun(direction: Vec3, irradiance: float = 2.0, tangent: float = 0.0047) -> Light:
+    return Light("sun", (0.0, 0.0, 0.0), direction, (irradiance,) * 3, tangent, 360.0)
+
+
+def panel(position: Vec3, direction: Vec3, size_m: tuple[float, float], radiance: float = 2.0) -> Light:
+    return Light("area", position, direction, (radiance,) * 3, 0.0, 360.0, size_m)
+
+
+def test_the_sun_shines_everywhere_alike(renderer: Renderer) -> None:
+    """L = albedo / pi * E * cos(theta), at any distance."""
+    frame = draw(renderer, view(lambertian(grid(6.0)), lights=(sun((0.6, 0.0, -0.8)),)))
+    np.testing.assert_allclose(frame.radiance, 0.5 / np.pi * 2.0 * 0.8, rtol=2e-3)
+
+
+def test_the_sun_casts_parallel_shadows(renderer: Renderer) -> None:
+    """The shadow of a block of height h ends h tan(zenith angle) behind it."""
+    tall = lambertian(block((0.2, 0.6, 0.4)), object_id=1)
+    frame = draw(renderer, view(lambertian(grid(6.0)), tall, lights=(sun((0.6, 0.0, -0.8)),)))
+    row, x = frame.radiance[48, :, 0], floor_points(FROM_ABOVE)[48, :, 0]
+    floor = (x > 0.16) & (frame.object_id[48] == 0)
+    edge, pixel = 0.1 + 0.4 * 0.6 / 0.8, x[1] - x[0]
+    assert (row[floor & (x < edge - pixel)] < 1e-3).all()
+    np.testing.assert_allclose(row[floor & (x > edge + pixel)], 0.5 / np.pi * 2.0 * 0.8, rtol=2e-3)
+
+
+@pytest.mark.parametrize(
+    "light",
+    [
+        panel((0.2, -0.1, 1.0), (0.0, 0.0, -1.0), (0.8, 0.4)),
+        panel((0.9, 0.2, 0.3), (-1.0, 0.1, 0.0), (0.5, 1.2)),
+    ],
+    ids=["above", "standing in the floor"],
+)
+def test_an_area_light_is_an_integral(renderer: Renderer, light: Light) -> None:
+    """Irradiance within 1 % of the integral over the rectangle, also where the horizon cuts it."""
+    frame = draw(renderer, view(lambertian(grid(8.0)), lights=(light,), camera=SMALL))
+    points = floor_points(SMALL)
+    direction = np.array(light.direction) / np.linalg.norm(light.direction)
+    width = np.cross(direction, (0.0, 0.0, 1.0))
+    width = np.array(ONE) * (1, 0, 0) if np.linalg.norm(width) < 1e-6 else width / np.linalg.norm(width)
+    height = np.cross(width, direction)
+    t = (np.arange(120) + 0.5) / 120 - 0.5
+    u, v = np.meshgrid(t * light.size_m[0], t * light.size_m[1])
+    spots = np.array(light.position_m) + u[..., None] * width + v[..., None] * height
+    expected = np.zeros(points.shape[:2])
+    for spot in spots.reshape(-1, 3):
+        to = spot - points
+        r2 = (to**2).sum(-1)
+        cosines = np.maximum(to[..., 2], 0) * np.maximum(-(to @ direction), 0) / r2
+        expected += cosines / r2
+    expected *= 0.5 / np.pi * 2.0 * light.size_m[0] * light.size_m[1] / t.size**2
+    inner = np.abs((points - light.position_m) @ direction) > 0.05
+    inner &= expected > 0.02 * expected[inner].max()
+    np.testing.assert_allclose(frame.radiance[inner, 0], expected[inner], rtol=0.01)
+
+
+def test_an_area_light_casts_a_soft_shadow(renderer: Renderer) -> None:
+    """Behind an edge the light grows over the width of its image, from nothing to all."""
+    light = panel((-0.4, 0.0, 1.5), (0.0, 0.0, -1.0), (0.2, 0.2))
+    shade = lambertian(block((1.0, 3.0, 0.004)), at=Transform((-0.5, 0.0, 0.5), (0, 0, 0), ONE), object_id=1)
+    camera = replace(FROM_ABOVE, width=192, height=192)
+    shaded = draw(renderer, view(lambertian(grid(8.0)), shade, lights=(light,), camera=camera))
+    free = draw(renderer, view(lambertian(grid(8.0)), lights=(light,), camera=camera))
+    share = (shaded.radiance / free.radiance)[96, :, 0]
+    x = floor_points(camera)[96, :, 0]
+    floor = (shaded.object_id[96] == 0) & (x > 0)
+    low, high = (np.interp(level, share[floor], x[floor]) for level in (0.1, 0.9))
+    assert 0.75 * 0.08 < high - low < 1.35 * 0.08
+    assert abs((low + high) / 2 - 0.2) < 0.01
+    assert share[floor & (x > 0.32)].min() > 0.99
+
+
+def test_an_area_light_is_seen_and_mirrored(renderer: Renderer) -> None:
+    """Its face has its own radiance; a mirror floor under it shows nearly that, and never more."""
+    light = panel((0.0, 0.0, 0.25), (0.0, 0.0, -1.0), (1.0, 1.0), 3.0)
+    below = Camera((0.0, 0.0, 0.1), (0.0, 0.0, 1.0), (0.0, 1.0, 0.0), 40.0, 32, 32)
+    face = panel_drawable(light, plain())
+    frame = draw(renderer, view(lambertian(grid(8.0)), face, lights=(light,), camera=below))
+    np.testing.assert_allclose(frame.radiance, 3.0, rtol=1e-3)
+    assert (frame.object_id == -1).all()
+    mirror = Drawable(grid(8.0), STILL, (plain(ONE, roughness=20, family="metal"),), 0)
+    across = Camera((0.0, -0.8, 0.3), (0.0, 0.0, -0.1), (0.0, 0.0, 1.0), 20.0, 32, 32)
+    frame = draw(renderer, view(mirror, face, lights=(light,), camera=across))
+    assert 2.4 < frame.radiance[16, 16, 0] <= 3.0 * 1.01
+    assert frame.radiance.max() <= 3.0 * 1.05
+
+
+def test_a_shining_surface_lights_its_neighbourhood(renderer: Renderer) -> None:
+    """A ball of radiance L and radius R gives E = pi L R^2 cos / d^2."""
+    glowing = replace(plain((0.8, 0.8, 0.8)), emission=5.0)
+    lamp = Drawable(sphere(0.1), Transform((0.0, 0.0, 1.0), (0, 0, 0), ONE), (glowing,), 1, specular=0.0)
+    camera = replace(FROM_ABOVE, position_m=(1.5, 0.0, 1.2), target_m=(1.0, 0.0, 0.0))
+    frame = draw(renderer, view(lambertian(grid(8.0)), lamp, camera=camera))
+    points = floor_points(camera)
+    to = np.array((0.0, 0.0, 1.0)) - points
+    d = np.linalg.norm(to, axis=-1)
+    expected = 0.5 / np.pi * (np.pi * 4.0 * 0.1**2) * to[..., 2] / d**3
+    floor = frame.object_id == 0
+    np.testing.assert_allclose(frame.radiance[floor, 0], expected[floor], rtol=0.03)
+    above = draw(renderer, view(lamp, camera=FROM_ABOVE))
+    np.testing.assert_allclose(above.radiance[48, 48], 4.0, rtol=1e-3)
+
+
+def test_a_grey_sky_is_a_furnace(renderer: Renderer) -> None:
+    """Under a sky of one radiance in all directions a surface shows albedo times it; and the sky is seen."""
+    radiance = np.full((32, 64, 3), 0.7, np.float32)
+    what = replace(view(lambertian(sphere(0.3), (0.8, 0.4, 0.1))), sky=Sky("procedural", (0.7, 0.7, 0.7)))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("fsid.render.renderer.panorama", lambda sky: radiance)
+        frame = draw(renderer, what)
+    np.testing.assert_allclose(frame.radiance[44:52, 44:52].mean((0, 1)), (0.56, 0.28, 0.07), rtol=5e-3)
+    np.testing.assert_allclose(frame.radiance[:4, :4], 0.7, rtol=1e-3)
+    assert np.isinf(frame.depth[:4, :4]).all()
+
+
+@pytest.mark.parametrize("cloudiness", [0.0, 0.7])
+def test_a_procedural_sky_has_its_mean(cloudiness: float) -> None:
+    colour = (0.3, 0.4, 0.7)
+    picture = panorama(Sky("procedural", colour, seed=5, cloudiness=cloudiness, azimuth_deg=40.0))
+    elevation = np.pi / 2 - (np.arange(len(picture)) + 0.5) / len(picture) * np.pi
+    weight = np.cos(elevation) * (elevation > 0)
+    mean = (picture * weight[:, None, None]).sum((0, 1)) / (weight.sum() * picture.shape[1])
+    np.testing.assert_allclose(mean, colour, rtol=1e-4)
+    assert picture.min() >= 0
+
+
+LOBES: dict[str, dict[str, float]] = {
+    "clearcoat": {"clearcoat": 1.0},
+    "sheen": {"sheen": 1.0},
+    "translucency": {"translucency": 0.6},
+    "all": {"clearcoat": 0.7, "clearcoat_roughness": 0.6, "sheen": 0.6, "translucency": 0.5},
+}
+
+
+@pytest.mark.parametrize("name", LOBES)
+def test_lobes_in_a_white_furnace(renderer: Renderer, name: str) -> None:
+    """In surroundings of 1 a white body shows 1, whatever layers it has."""
+    material = replace(plain(ONE), **LOBES[name])
+    frame = draw(renderer, view(Drawable(sphere(0.3), STILL, (material,), 0, specular=0.0), ambient=1.0))
+    np.testing.assert_allclose(frame.radiance[40:56, 40:56], 1.0, rtol=0.01)
+
+
+@pytest.mark.parametrize("name", ["none", "metal", "all"])
+def test_lobes_reflect_no_more_than_arrives(renderer: Renderer, name: str) -> None:
+    """White, under light of 1 from 112 directions of the whole sphere: between 0.85 and 1.03 comes back."""
+    family = "metal" if name == "metal" else "plain"
+    material = replace(plain(ONE, roughness=60, family=family), **LOBES.get(name, {}))
+    camera = Camera((0.9, 0.0, 0.6), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 10.0, 16, 16)
+    sheet = Drawable(grid(0.4), STILL, (material,), 0)
+    i = np.arange(112)
+    z, phi = 1 - (2 * i + 1) / 112, i * np.pi * (3 - np.sqrt(5))
+    directions = np.stack([np.sqrt(1 - z * z) * np.cos(phi), np.sqrt(1 - z * z) * np.sin(phi), z], axis=-1)
+    total = 0.0
+    for some in directions.reshape(7, 16, 3):
+        lights = tuple(sun((x, y, z), 4 * np.pi / 112) for x, y, z in some.tolist())
+        total += float(draw(renderer, view(sheet, lights=lights, camera=camera)).radiance[8, 8, 1])
+    assert 0.85 < total < 1.03
+
+
+def test_light_passes_through_a_translucent_sheet(renderer: Renderer) -> None:
+    """Lit from behind, L = albedo t / pi E; lit from the front, (1 - t) of what an opaque one shows."""
+    sheet = replace(plain((0.6, 0.6, 0.6)), translucency=0.4)
+    thin = Drawable(grid(1.0), STILL, (sheet,), 0, specular=0.0)
+    for height, share in ((-1.0, 0.4), (1.0, 0.6)):
+        frame = draw(renderer, view(thin, lights=(sun((0.0, 0.0, -height)),), camera=SMALL))
+        np.testing.assert_allclose(frame.radiance[16, 16], 0.6 * share / np.pi * 2.0, rtol=5e-3)
+
+
+def test_glass_shows_what_is_behind_it(renderer: Renderer) -> None:
+    """A clear pane passes (1 - F)^2 of the floor's light, and the labels are the pane's."""
+    glass = replace(plain(ONE, roughness=20), transmission=1.0)
+    pane = Drawable(block((0.6, 0.6, 0.01)), Transform((0.0, 0.0, 0.5), (0, 0, 0), ONE), (glass,), 1)
+    lights = (sun((0.6, 0.0, -0.8)),)
+    frame = draw(renderer, view(lambertian(grid(6.0)), pane, lights=lights))
+    floor = 0.5 / np.pi * 2.0 * 0.8
+    np.testing.assert_allclose(frame.radiance[4, 4], floor, rtol=5e-3)
+    np.testing.assert_allclose(frame.radiance[44:52, 44:52], 0.96**2 * floor, rtol=0.01)
+    assert frame.object_id[48, 48] == 1
+    assert frame.object_id[4, 4] == 0
+    np.testing.assert_allclose(frame.depth[48, 48], 1.49, atol=1e-3)
+
+
+def test_glass_bends_rays_at_a_slant(renderer: Renderer) -> None:
+    """Through a thick slanted pane the edge of a stripe is seen elsewhere."""
+    glass = replace(plain(ONE, roughness=20), transmission=1.0)
+    stripe = lambertian(
+        grid(0.3), (0.9, 0.9, 0.9), at=Transform((0.0, 0.0, 0.001), (0, 0, 0), ONE), object_id=2
+    )
+    floor = lambertian(grid(6.0), (0.05, 0.05, 0.05))
+    pane = Drawable(block((1.0, 1.0, 0.3)), Transform((0.0, 0.0, 0.7), (0.0, 35.0, 0.0), ONE), (glass,), 1)
+    lights = (sun((0.0, 0.0, -1.0)),)
+    plain_view = draw(renderer, view(floor, stripe, lights=lights)).radiance[48, :, 0]
+    through = draw(renderer, view(floor, stripe, pane, lights=lights)).radiance[48, :, 0]
+    bright = [np.flatnonzero(row > 0.6 * row[30:66].max()) for row in (plain_view, through)]
+    assert abs(bright[0].mean() - bright[1].mean()) > 0.5
+
+
+def test_sampled_scenes_are_finite_and_without_fireflies(renderer: Renderer) -> None:
+    """No pixel outshines the brightest of its 24 neighbours fifty times."""
+    for seed in (21,):
+        frame = renderer.render(sample(SceneConfig(objects=(10, 14)), seed, width=160, height=90))
+        for array in (frame.radiance, frame.albedo, frame.normal):
+            assert np.isfinite(array).all()
+        assert frame.radiance.min() >= 0
+        luminance = frame.radiance.mean(-1)
+        windows = np.lib.stride_tricks.sliding_window_view(luminance, (5, 5)).reshape(86, 156, 25)
+        others = np.delete(windows, 12, axis=-1).max(-1)
+        assert (luminance[2:-2, 2:-2] < 50 * others + 0.05 * luminance.mean()).all()
+
+
+def simple_scene(**light: object):
+    scene = sample(SceneConfig(objects=(1, 1)), 0, width=32, height=32)
+    return replace(scene, lights=(replace(point_light((0.0, 0.0, 1.0)), **light),))
+
+
+@pytest.mark.parametrize(
+    ("light", "message"),
+    [
+        ({"kind": "laser"}, r"lights\[0\].kind 'laser'"),
+        ({"kind": "area"}, r"lights\[0\].size_m"),
+        ({"kind": "sun", "direction": (0.0, 0.0, 0.0)}, r"lights\[0\].direction"),
+    ],
+)
+def test_a_light_that_makes_no_sense_is_named(light: dict, message: str) -> None:
+    with pytest.raises(FsidError, match=message):
+        view_of(simple_scene(**light), 0)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("a.hdr", b"nothing", "no complete Radiance"),
+        ("b.hdr", b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 16 +X 32\n" + bytes(99), "no complete Radiance"),
+        ("c.hdr", b"#?RADIANCE\n\n-Y 16 +X 16\n" + bytes(16 * 16 * 4), "equirectangular"),
+    ],
+)
+def test_a_broken_sky_is_named(tmp_path, name: str, content: bytes, message: str) -> None:
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(FsidError, match=message):
+        panorama(Sky(f"file:{tmp_path / name}", ONE))
+
+
+def test_a_sky_of_a_file_is_read_and_scaled(tmp_path) -> None:
+    pixels = np.full((16, 32, 4), (128, 64, 32, 129), np.uint8)
+    path = tmp_path / "sky.hdr"
+    path.write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 16 +X 32\n" + pixels.tobytes())
+    picture = panorama(Sky(f"file:{path}", (1.0, 1.0, 1.0)))
+    assert picture.shape == (16, 32, 3)
+    np.testing.assert_allclose(picture[3, 3] / picture[3, 3, 0], (1.0, 0.5, 0.25), rtol=1e-5)
+
+
+def test_a_background_without_a_material_is_named() -> None:
+    with pytest.raises(FsidError, match="'ceiling' is missing"):
+        background_drawable(
+            Background(
+                "room",
+                (3.0, 3.0, 2.5),
+                dict.fromkeys(("wall_east", "wall_west", "wall_north", "wall_south"), plain()),
+            )
+        )
