@@ -18,6 +18,7 @@ from fsid.cli import (
     doctor,
     evaluate,
     experiment,
+    export,
     generate,
     inspect,
     preview,
@@ -41,6 +42,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "testset": testset.testset,
     "evaluate": evaluate.evaluate,
     "experiment": experiment.experiment,
+    "export": export.export,
     "demo": demo.demo,
     "doctor": doctor.doctor,
 }

@@ -28,7 +28,8 @@ from fsid.files import write_atomically
 from fsid.sensor import NoiseLevel
 
 MODEL_FILE = "model.safetensors"  # inside a run folder
-DEFAULT_MODEL = "nafnet-small"  # a file of the folder `weights`
+WEIGHTS = Path(str(files("fsid.denoise"))) / "weights"  # what ships: NAME.safetensors and its card, NAME.json
+DEFAULT_MODEL = "nafnet-small"
 _CARD = "fsid_card"
 
 
@@ -106,7 +107,7 @@ def save_model(
 def model_path(run_or_file: str | Path | None) -> Path:
     """The file of a network: of a run folder, a shipped one by its name, a file; None is `DEFAULT_MODEL`."""
     name = str(run_or_file or DEFAULT_MODEL)
-    shipped = Path(str(files("fsid.denoise") / "weights" / f"{name}.safetensors"))
+    shipped = WEIGHTS / f"{name}.safetensors"
     if shipped.is_file():
         return shipped
     if run_or_file is None:

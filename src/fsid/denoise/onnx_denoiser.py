@@ -34,12 +34,12 @@ class OnnxDenoiser:
 
     def averages(self, patch: np.ndarray, level: NoiseLevel) -> np.ndarray:
         """The averages that channel attention takes over `patch` (4, h, w): (n,)."""
-        return self.session.run(["averages_out"], _inputs(patch, level))[0]
+        return self.session.run(["averages_out"], inputs(patch, level))[0]
 
     def run(self, tile: np.ndarray, level: NoiseLevel, averages: np.ndarray) -> np.ndarray:
         """The clean estimate (4, h, w) of `tile` with channel attention held at `averages` (n,)."""
         frozen = {"averages": averages.astype(np.float32), "frozen": np.ones((), np.float32)}
-        return self.session.run(["clean"], _inputs(tile, level) | frozen)[0][0]
+        return self.session.run(["clean"], inputs(tile, level) | frozen)[0][0]
 
 
 def load_onnx(file: Path) -> OnnxDenoiser:
@@ -70,6 +70,7 @@ def onnx_denoiser(graph: bytes, source: str) -> OnnxDenoiser:
         raise FsidError(f"{source}: is not a file of `fsid export`") from None
 
 
-def _inputs(packed: np.ndarray, level: NoiseLevel) -> dict[str, np.ndarray]:
+def inputs(packed: np.ndarray, level: NoiseLevel) -> dict[str, np.ndarray]:
+    """What the graph needs at least: `packed` (4, h, w) and its noise level."""
     k, sigma2 = (np.array([values], np.float32) for values in (level.k, level.sigma2))
     return {"noisy": packed[None], "k": k, "sigma2": sigma2}

@@ -11,6 +11,7 @@ averages of some patches first, then overlapping tiles with that mean: what `den
 
 from __future__ import annotations
 
+import copy
 import io
 import json
 import logging
@@ -45,12 +46,29 @@ that start on multiples of `multiple` and overlap by `receptive_radius` rounded 
 The result is that of one large call."""
 
 
-class _Graph(nn.Module):
-    """The network with its averages as input and output."""
+class _Half(nn.Module):
+    """NAFNet in half precision between single-precision neighbours.
 
-    def __init__(self, denoiser: Denoiser) -> None:
+    The stabilising transform stays outside: k and sigma2 of a phone (1e-4, 1e-6) are below what half
+    precision resolves.
+    """
+
+    def __init__(self, core: nn.Module) -> None:
         super().__init__()
-        self.net = denoiser.net
+        self.core = core.half()
+
+    def forward(self, image: Tensor) -> Tensor:
+        return self.core(image.half()).float()
+
+
+class _Graph(nn.Module):
+    """The network with its averages as input and output; half: NAFNet in float16."""
+
+    def __init__(self, denoiser: Denoiser, half: bool) -> None:
+        super().__init__()
+        self.net = copy.deepcopy(denoiser.net).cpu()
+        if half:
+            self.net.net = _Half(self.net.net)  # type: ignore[assignment]
         self.widths = denoiser.attention_widths
 
     def forward(
@@ -61,8 +79,8 @@ class _Graph(nn.Module):
         used: dict[SpatialMean, Tensor] = {}
 
         def choose(mean: SpatialMean, _: Any, own: Tensor) -> Tensor:
-            used[mean] = frozen * given[mean].reshape(1, -1, 1, 1) + (1 - frozen) * own
-            return used[mean]
+            used[mean] = frozen * given[mean].reshape(1, -1, 1, 1) + (1 - frozen) * own.float()
+            return used[mean].to(own.dtype)
 
         hooks = [mean.register_forward_hook(choose) for mean in means]
         clean = self.net(noisy, k, sigma2)
@@ -71,12 +89,12 @@ class _Graph(nn.Module):
         return clean, torch.cat([used[mean].flatten() for mean in means])
 
 
-def onnx_model(denoiser: Denoiser) -> Any:
-    """The network as `onnx.ModelProto`, float32, any height and width, metadata included."""
+def onnx_model(denoiser: Denoiser, *, half: bool = False) -> Any:
+    """The network as `onnx.ModelProto`, any height and width, metadata included; half: float16 inside."""
     import onnx
     import onnxscript  # noqa: F401  the exporter needs it, and says so in many lines where it is missing
 
-    graph = _Graph(denoiser).eval()
+    graph = _Graph(denoiser, half).eval()
     example = (
         torch.rand(1, 4, _EXAMPLE_PX, _EXAMPLE_PX),
         torch.full((1, 4), 1e-3),
@@ -114,6 +132,10 @@ def onnx_bytes(denoiser: Denoiser) -> bytes:
 def _described(model: Any, denoiser: Denoiser) -> Any:
     import onnx
 
+    for part in (*model.graph.node, *model.graph.value_info, *model.graph.input, *model.graph.output):
+        part.ClearField("metadata_props")  # Python stack traces, with paths of this machine
+        part.ClearField("doc_string")
+    model.graph.ClearField("metadata_props")
     model.producer_name, model.doc_string = "fsid", DESCRIPTION
     notes = {
         CARD_KEY: json.dumps(to_plain(denoiser.card)),

@@ -1,0 +1,108 @@
+"""A trained network as one file for others: .onnx for any runtime, .safetensors to ship with this package.
+
+Each is checked before it is written: an .onnx file against PyTorch, a smaller precision for what it costs.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import torch
+
+from fsid.denoise.denoise import denoise_raw
+from fsid.denoise.model import Denoiser, load_denoiser, model_path, save_model
+from fsid.denoise.onnx_denoiser import onnx_denoiser
+from fsid.denoise.onnx_export import onnx_model
+from fsid.denoise.onnx_int8 import eight_bit
+from fsid.denoise.quality import Probe, mean_psnr, probes
+from fsid.denoise.sessions import read_sessions
+from fsid.errors import FsidError
+from fsid.files import write_atomically
+
+Precision = Literal["float32", "float16", "int8"]
+TOLERANCE = 1e-4  # between onnxruntime and PyTorch, of the normalised clean image
+HALF_LIMIT_DB = 0.01  # weights are shipped in half precision where that costs less
+
+
+@dataclass(frozen=True)
+class Export:
+    """What was written.
+
+    psnr: of the network on the probes, dB; loss_db: what the file's precision costs of it. difference: the
+    largest one of the graph in single precision to PyTorch, normalised units.
+    """
+
+    file: Path
+    precision: Precision
+    psnr: float
+    loss_db: float
+    difference: float
+
+
+def export(run: str | Path | None, file: Path, precision: Precision | None = None) -> Export:
+    """Write the network of `run` (see `load_model`) to `file`, .onnx or .safetensors.
+
+    precision: None is float32 for .onnx, and for .safetensors float16 where that costs less than
+    `HALF_LIMIT_DB`. FsidError: no such network, another suffix or precision, a result that does not agree.
+    """
+    path = model_path(run)
+    suffix = file.suffix.lower()
+    if suffix not in (".onnx", ".safetensors"):
+        raise FsidError(f"{file}: a network is exported as .onnx or .safetensors")
+    if suffix == ".safetensors" and precision == "int8":
+        raise FsidError("int8: is for .onnx; .safetensors holds float32 or float16")
+    if not file.parent.is_dir():
+        raise FsidError(f"{file.parent}: no such folder")
+    denoiser = load_denoiser(path)
+    measured = probes()
+    if suffix == ".onnx":
+        return _onnx(denoiser, file, precision or "float32", measured)
+    return _safetensors(denoiser, path, file, precision, measured)
+
+
+def _onnx(denoiser: Denoiser, file: Path, precision: Precision, measured: list[Probe]) -> Export:
+    model = onnx_model(denoiser)
+    single = onnx_denoiser(model.SerializeToString(), str(file))
+    difference = max(
+        float(np.abs(denoise_raw(p.noisy, single).mosaic - denoise_raw(p.noisy, denoiser).mosaic).max())
+        for p in measured
+    )
+    if not difference <= TOLERANCE:
+        raise FsidError(f"{file}: onnxruntime differs from PyTorch by {difference:.1e}; nothing was written")
+    if precision != "float32":
+        model = onnx_model(denoiser, half=True) if precision == "float16" else eight_bit(model)
+    graph = model.SerializeToString()
+    psnr = mean_psnr(denoiser, measured)
+    loss = psnr - mean_psnr(onnx_denoiser(graph, str(file)), measured)
+    write_atomically(file, graph)
+    return Export(file, precision, psnr, loss, difference)
+
+
+def _safetensors(
+    denoiser: Denoiser, source: Path, file: Path, precision: Precision | None, measured: list[Probe]
+) -> Export:
+    weights = denoiser.net.state_dict()
+    halved = {name: tensor.half() for name, tensor in weights.items()}
+    net = type(denoiser.net)(denoiser.card.network).eval().requires_grad_(False)
+    net.load_state_dict(halved)
+    half = replace(denoiser, net=net, device=torch.device("cpu"))
+    psnr = mean_psnr(denoiser, measured)
+    loss = psnr - mean_psnr(half, measured)
+    if precision is None:
+        precision = "float16" if loss < HALF_LIMIT_DB else "float32"
+    small = precision == "float16"
+    notes = {"sessions": read_sessions(source.parent) or _sessions_of(source), "precision": precision}
+    save_model(file, halved if small else weights, denoiser.card, notes)
+    return Export(file, precision, psnr, loss if small else 0.0, 0.0)
+
+
+def _sessions_of(model: Path) -> list[object]:
+    """The sessions in the card beside a network that was exported before."""
+    try:
+        return list(json.loads(model.with_suffix(".json").read_text(encoding="utf-8"))["sessions"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return []

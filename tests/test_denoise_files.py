@@ -1,0 +1,185 @@
+"""Files: any noise, one or many, and nothing of the original is lost but its noise."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tifffile
+
+torch = pytest.importorskip("torch")
+
+import fsid  # noqa: E402
+from fsid.cli.main import main  # noqa: E402
+from fsid.denoise import ModelCard, NetworkConfig, RawDenoiser, denoise_raw, load_model, save_model  # noqa: E402
+from fsid.denoise import model as model_module  # noqa: E402
+from fsid.denoise.export import export  # noqa: E402
+from fsid.denoise.files import noise_of  # noqa: E402
+from fsid.denoise.preview import PREVIEW_PX, preview_of  # noqa: E402
+from fsid.errors import FsidError  # noqa: E402
+from fsid.sensor import Raw, develop, load_profile, noisy_from_clean, read_raw, write_dng  # noqa: E402
+from fsid.sensor.metadata import exposure_metadata  # noqa: E402
+
+PROFILE = load_profile("galaxy-s22")
+CARD = ModelCard(NetworkConfig(width=4), patch_px=32, training="nothing")
+
+
+def blurring_network(path: Path) -> Path:
+    """A network that does something: its last convolution pulls each pixel to the mean of its neighbours."""
+    torch.manual_seed(0)
+    net = RawDenoiser(CARD.network)
+    with torch.no_grad():
+        net.net.intro.weight.zero_()
+        net.net.ending.weight.zero_()
+        for site in range(4):
+            net.net.intro.weight[site, site, 1, 1] = 1
+            net.net.ending.weight[site, site] = 2.0
+            net.net.ending.weight[site, site, 1, 1] = -16.0
+    save_model(path, net.state_dict(), CARD)
+    return path
+
+
+@pytest.fixture(scope="module")
+def network(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return blurring_network(tmp_path_factory.mktemp("network") / "blur.safetensors")
+
+
+def noisy_raw(iso: float = 3200) -> Raw:
+    rng = np.random.default_rng(5)
+    ramp = np.broadcast_to(np.linspace(0.02, 0.6, 320, dtype=np.float32), (256, 320))
+    clean = Raw(
+        ramp,
+        PROFILE.cfa,
+        PROFILE.black_level,
+        PROFILE.white_level,
+        (2.0, 1.0, 1.5),
+        PROFILE.xyz_to_camera,
+        camera="Galaxy",
+        metadata=exposure_metadata(exposure_s=1 / 30, f_number=1.8, lens="wide"),
+    )
+    return noisy_from_clean(rng, clean, iso, PROFILE.level(iso))
+
+
+@pytest.fixture
+def noisy_file(tmp_path: Path) -> Path:
+    write_dng(tmp_path / "noisy.dng", noisy_raw())
+    return tmp_path / "noisy.dng"
+
+
+def test_a_denoised_file_keeps_what_the_original_said(noisy_file: Path, network: Path) -> None:
+    out = noisy_file.with_name("clean.dng")
+    main(["denoise", str(noisy_file), str(out), "--model", str(network), "--quiet"])
+    noisy, clean = read_raw(noisy_file), read_raw(out)
+    assert np.abs(clean.mosaic - noisy.mosaic).mean() > 1e-3
+    assert (clean.cfa, clean.camera, clean.iso) == (noisy.cfa, noisy.camera, noisy.iso)
+    assert clean.white_balance == pytest.approx(noisy.white_balance, rel=1e-4)
+    assert {42036, 33434} <= {tag.code for tag in clean.metadata.exif}  # lens, exposure time
+    assert clean.metadata.exif == noisy.metadata.exif
+    assert clean.noise is None
+    with tifffile.TiffFile(out) as dng:
+        preview = dng.pages[0].asarray()
+    assert preview.shape == (256, 320, 3)
+    assert preview.mean() == pytest.approx(255 * develop(clean).clip(0, 1).mean(), abs=3)
+
+
+def test_the_noise_is_the_profile_s_or_the_file_s_or_the_image_s(tmp_path: Path) -> None:
+    raw = noisy_raw(3200)
+    assert noise_of(raw, None, None, tmp_path).level == raw.noise
+    assert noise_of(raw, "pixel6", None, tmp_path).level == load_profile("pixel6").level(3200)
+    assert noise_of(raw, "pixel6", 800, tmp_path).level == load_profile("pixel6").level(800)
+    blind = noise_of(replace(raw, noise=None), None, None, tmp_path)
+    assert "estimated" in blind.source
+    assert raw.noise is not None
+    for x in (0.05, 0.3):
+        true, found = (np.array(n.k) * x + np.array(n.sigma2) for n in (raw.noise, blind.level))
+        np.testing.assert_allclose(found, true, rtol=0.25)
+    tiny = replace(raw, mosaic=raw.mosaic[:16, :16], noise=None)
+    with pytest.raises(FsidError, match=r"holds no NoiseProfile.*--profile"):
+        noise_of(tiny, None, None, tmp_path)
+    with pytest.raises(FsidError, match="--iso"):
+        noise_of(raw, None, 800, tmp_path)
+
+
+def test_strength(network: Path) -> None:
+    raw, model = noisy_raw(), load_model(network)
+    full = denoise_raw(raw, model).mosaic
+    np.testing.assert_allclose(denoise_raw(raw, model, strength=0).mosaic, raw.mosaic, atol=1e-6)
+    half = denoise_raw(raw, model, strength=0.5).mosaic
+    np.testing.assert_allclose(half, (full + raw.mosaic) / 2, atol=1e-6)
+    assert raw.noise is not None
+    doubled = denoise_raw(raw, model, strength=2).mosaic
+    stronger = type(raw.noise)(tuple(4 * k for k in raw.noise.k), tuple(4 * s for s in raw.noise.sigma2))
+    np.testing.assert_array_equal(doubled, denoise_raw(raw, model, stronger).mosaic)
+    assert np.abs(doubled - full).mean() > 1e-4
+    for wrong in (-0.1, np.nan, np.inf):
+        with pytest.raises(FsidError, match="strength"):
+            denoise_raw(raw, model, strength=wrong)
+
+
+def test_a_folder_is_done_file_by_file(
+    tmp_path: Path, network: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, out = tmp_path / "in", tmp_path / "out"
+    folder.mkdir()
+    for name in ("a", "b"):
+        write_dng(folder / f"{name}.dng", noisy_raw())
+    (folder / "notes.txt").write_text("no RAW")
+    main(["denoise", str(folder), str(out), "--model", str(network), "--quiet"])
+    assert sorted(path.name for path in out.iterdir()) == ["a.dng", "b.dng"]
+    assert read_raw(out / "a.dng").mosaic.shape == (256, 320)
+    (folder / "aa.dng").write_text("broken")
+    with pytest.raises(SystemExit) as stop:
+        main(["denoise", str(folder), str(tmp_path / "again"), "--model", str(network), "--quiet"])
+    assert stop.value.code == 2
+    told = capsys.readouterr().err
+    assert "aa.dng" in told
+    assert "1 of 3 files" in told
+    assert sorted(path.name for path in (tmp_path / "again").iterdir()) == ["a.dng", "b.dng"]
+    with pytest.raises(SystemExit):
+        main(["denoise", str(folder), str(folder), "--model", str(network), "--quiet"])
+    assert "overwritten" in capsys.readouterr().err
+
+
+def test_a_large_preview_is_small(rng: np.random.Generator) -> None:
+    raw = replace(noisy_raw(), mosaic=rng.random((64, 5000), dtype=np.float32))
+    preview = preview_of(raw)
+    assert preview is not None
+    assert max(preview.shape) <= PREVIEW_PX
+    assert preview_of(replace(raw, mosaic=raw.mosaic[:2, :2])) is None
+
+
+def test_what_ships_is_found_by_name_and_by_default(
+    tmp_path: Path, network: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(model_module, "WEIGHTS", tmp_path)
+    with pytest.raises(FsidError, match="no network ships"):
+        load_model()
+    done = export(network, tmp_path / f"{model_module.DEFAULT_MODEL}.safetensors")
+    assert done.precision == "float16"
+    assert abs(done.loss_db) < 0.01
+    assert done.file.stat().st_size < 0.7 * network.stat().st_size
+    raw = noisy_raw()
+    expected = denoise_raw(raw, load_model(network)).mosaic
+    for model in (load_model(), load_model(model_module.DEFAULT_MODEL)):
+        assert model.card == CARD
+        np.testing.assert_allclose(denoise_raw(raw, model).mosaic, expected, atol=1e-3)
+
+
+def test_the_python_interface(noisy_file: Path, network: Path) -> None:
+    raw, model = fsid.read_raw(noisy_file), fsid.load_model(network)
+    clean = fsid.denoise(raw, model=model)
+    np.testing.assert_array_equal(clean.mosaic, denoise_raw(raw, model).mosaic)
+    np.testing.assert_array_equal(fsid.denoise(raw, "galaxy-s22", model=network, iso=raw.iso).cfa, clean.cfa)
+    fsid.write_dng(noisy_file.with_name("out.dng"), clean)
+    stored = read_raw(noisy_file.with_name("out.dng")).mosaic
+    np.testing.assert_allclose(stored, clean.mosaic.clip(max=1), atol=1e-4)
+    assert fsid.develop(clean).shape == (256, 320, 3)
+
+
+def test_importing_the_package_imports_no_pytorch() -> None:
+    script = "import sys, fsid; fsid.read_raw; sys.exit('torch' in sys.modules)"
+    subprocess.run([sys.executable, "-c", script], check=True)
