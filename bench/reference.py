@@ -1,0 +1,141 @@
+"""The rasteriser beside other renderers on the same scenes: seconds per frame, and the noise that is left.
+
+    python bench/reference.py --width 960 --samples 64                 Mitsuba 3 (fsid[reference])
+    python bench/reference.py --width 960 --blender PYTHON             Blender Cycles too, through the .glb
+
+Times are the best of `--repeat` draws of a scene that is already loaded, in one run, renderers in turn;
+PYTHON is an interpreter that has `bpy`. Noise is the standard deviation between two renders that differ in
+their seed alone, relative to the median radiance: the rasteriser's is 0 by construction (same bits).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from fsid.render import Frame, Renderer
+from fsid.render.reference import ReferenceRenderer, agreement
+from fsid.scene import Scene, SceneConfig, sample
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--width", type=int, default=960, help="of the image, 16:9")
+    parser.add_argument("--samples", type=int, default=64, help="paths per pixel of Mitsuba")
+    parser.add_argument("--seeds", type=int, nargs="+", default=[3], help="scenes")
+    parser.add_argument("--objects", type=int, default=40, help="per scene")
+    parser.add_argument("--repeat", type=int, default=2, help="draws of each, the fastest counts")
+    parser.add_argument("--blender", type=Path, help="Python with bpy: Cycles with 32 samples and denoiser")
+    parser.add_argument("--figure", type=Path, help="picture of both renderers side by side to write")
+    options = parser.parse_args()
+    path_tracer = ReferenceRenderer(samples=options.samples)
+    print(f"Mitsuba {path_tracer.variant}, {options.samples} samples, {options.width} px wide")
+    panels = []
+    with Renderer() as raster:
+        for seed in options.seeds:
+            config = SceneConfig(objects=(options.objects, options.objects))
+            scene = sample(config, seed, width=options.width, height=options.width * 9 // 32 * 2)
+            scene = plain_lens(scene)
+            panels.append(compare(raster, path_tracer, scene, options))
+    if options.figure:
+        Image.fromarray(np.vstack(panels)).save(options.figure)
+
+
+def plain_lens(scene: Scene) -> Scene:
+    """The scene without what Mitsuba's camera does not have."""
+    camera = replace(scene.cameras[0], distortion=None, chromatic_aberration=(0.0, 0.0))
+    return replace(scene, cameras=(camera,))
+
+
+def compare(
+    raster: Renderer, path_tracer: ReferenceRenderer, scene: Scene, options: argparse.Namespace
+) -> np.ndarray:
+    """Prints one scene's lines; returns both images side by side, 8 bit."""
+    start = time.perf_counter()
+    prepared = path_tracer.prepare(scene, scene.cameras[0])
+    loading_s = time.perf_counter() - start
+    labels = prepared.labels()
+    drawn = raster.render(scene)
+    raster_s = traced_s = np.inf
+    images = []
+    for k in range(options.repeat):
+        raster_s = min(raster_s, seconds(lambda: raster.render(scene)))
+        start = time.perf_counter()
+        images.append(prepared.radiance(options.samples, k))
+        traced_s = min(traced_s, time.perf_counter() - start)
+    traced = replace(labels, radiance=np.mean(images, axis=0).astype(np.float32))
+    print(
+        f"scene {scene.seed}: rasteriser {raster_s:.2f} s, Mitsuba {traced_s:.1f} s "
+        f"(and {loading_s:.0f} s to load) = {traced_s / raster_s:.0f} x"
+    )
+    if len(images) > 1:
+        print(f"  noise of {options.samples} samples: {noise(*images[:2]):.3f} of the median radiance")
+    print(f"  {agreement(drawn, traced)}")
+    if options.blender:
+        cycles_s = cycles(options.blender, scene)
+        print(f"  Cycles, 32 samples + denoiser: {cycles_s:.1f} s = {cycles_s / raster_s:.0f} x")
+    return np.hstack([developed(drawn, drawn), developed(traced, drawn)])
+
+
+def seconds(work: Callable[[], object]) -> float:
+    start = time.perf_counter()
+    work()
+    return time.perf_counter() - start
+
+
+def noise(first: np.ndarray, second: np.ndarray) -> float:
+    """Median over the image of the standard deviation of one render, relative to the median radiance."""
+    deviation = np.abs(first - second).mean(-1) / np.sqrt(2)
+    return float(np.median(deviation) * np.sqrt(np.pi / 2) / np.median(first))
+
+
+def developed(frame: Frame, exposure: Frame) -> np.ndarray:
+    """sRGB-like 8 bit, as bright as `exposure` says."""
+    light = frame.radiance / np.median(exposure.radiance) * 0.2
+    return (np.clip(light, 0, 1) ** (1 / 2.2) * 255).astype(np.uint8)
+
+
+_CYCLES = """
+import sys, time, json, bpy
+glb, width, height = sys.argv[-3], int(sys.argv[-2]), int(sys.argv[-1])
+bpy.ops.wm.read_factory_settings(use_empty=True)
+bpy.ops.import_scene.gltf(filepath=glb)
+scene = bpy.context.scene
+scene.camera = next(o for o in bpy.data.objects if o.type == "CAMERA")
+scene.render.engine = "CYCLES"
+scene.cycles.samples, scene.cycles.use_denoising, scene.cycles.device = 32, True, "CPU"
+scene.cycles.use_adaptive_sampling = False
+scene.render.resolution_x, scene.render.resolution_y = width, height
+scene.render.resolution_percentage = 100
+scene.render.image_settings.file_format = "PNG"
+scene.render.filepath = glb[:-4] + ".png"
+start = time.perf_counter()
+bpy.ops.render.render(write_still=True)
+print(json.dumps({"seconds": time.perf_counter() - start}))
+"""
+
+
+def cycles(python: Path, scene: Scene) -> float:
+    """Seconds of one Cycles render of the exported scene."""
+    from fsid.render.gltf import write_glb
+
+    with tempfile.TemporaryDirectory() as folder:
+        glb = Path(folder) / "scene.glb"
+        write_glb(glb, scene, texture_size=256)
+        size = [str(scene.cameras[0].width), str(scene.cameras[0].height)]
+        command = [str(python), "-c", _CYCLES, str(glb), *size]
+        out = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    return float(json.loads(next(line for line in out.splitlines() if line.startswith("{")))["seconds"])
+
+
+if __name__ == "__main__":
+    main()
