@@ -13,6 +13,7 @@ from fsid.assets import build_mesh
 from fsid.errors import FsidError
 from fsid.render import Frame, Renderer
 from fsid.render.reference import ReferenceRenderer, agreement
+from fsid.render.sky import panorama
 from fsid.scene.model import (
     Background,
     Camera,
@@ -21,6 +22,7 @@ from fsid.scene.model import (
     Material,
     Object,
     Scene,
+    Sky,
     Transform,
 )
 
@@ -81,6 +83,24 @@ def test_the_sun_is_even():
     ground = Background("open-air", (40.0, 40.0, 0.5), {"ground": GREY})
     found = irradiance(renderer(16).render(replace(empty_room(light), background=ground)))
     np.testing.assert_allclose(found, 3.0 * 0.8, rtol=0.06)
+
+
+@pytest.mark.parametrize(("azimuth_deg", "elevation_deg"), [(20.0, 40.0), (110.0, 15.0), (250.0, 60.0)])
+def test_the_sky_is_seen_where_it_is(azimuth_deg: float, elevation_deg: float):
+    sky = Sky("procedural", (1.0, 1.0, 1.0), seed=4, cloudiness=0.7, azimuth_deg=30.0)
+    a, e = np.radians((azimuth_deg, elevation_deg))
+    ahead = np.array((np.cos(a) * np.cos(e), np.sin(a) * np.cos(e), np.sin(e)))
+    camera = replace(
+        DOWN, target_m=tuple(float(v) for v in np.array(DOWN.position_m) + ahead), up=(0, 0, 1.0)
+    )
+    ground = Background("open-air", (40.0, 40.0, 0.0), {"ground": GREY})
+    scene = replace(empty_room(camera=replace(camera, fov_deg=2.0)), background=ground, sky=sky)
+    frame = renderer(4).render(scene)
+    picture = panorama(sky)
+    row, column = int((90 - elevation_deg) / 180 * len(picture)), int(azimuth_deg / 360 * 2 * len(picture))
+    near = picture[row - 3 : row + 4, column - 3 : column + 4].mean((0, 1))
+    np.testing.assert_allclose(frame.radiance.mean((0, 1)), near, rtol=0.05)
+    assert np.isinf(frame.depth).all()
 
 
 def test_an_area_light_is_lambertian_one_sided_and_seen():

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from fsid.errors import FsidError
-from fsid.scene.model import Light
+from fsid.render.sky import panorama
+from fsid.scene.model import Light, Scene
 
 CLOUD = 32
 _RIM = 256
@@ -33,6 +34,18 @@ def emitters(mi: Any, light: Light, name: str) -> dict[str, Any]:
     rgb = np.array(light.colour) / len(spread)
     make = {"point": _point, "spot": _spot, "sun": _sun}[light.kind]
     return {f"{name}_{i}": make(mi, light, offset, rgb) for i, offset in enumerate(spread)}
+
+
+def surroundings(mi: Any, scene: Scene) -> dict[str, Any]:
+    """What light comes from outside: the sky's panorama, or `Scene.ambient` from everywhere."""
+    if scene.sky is not None:
+        matrix = np.eye(4)
+        matrix[:3, :3] = np.stack([(0, 1, 0), (0, 0, 1), (-1, 0, 0)], axis=-1)  # its y is up, its -z is our x
+        picture = mi.Bitmap(panorama(scene.sky))
+        return {"sky": {"type": "envmap", "bitmap": picture, "to_world": mi.ScalarTransform4f(matrix)}}
+    if any(scene.ambient):
+        return {"sky": {"type": "constant", "radiance": _rgb(np.array(scene.ambient))}}
+    return {}
 
 
 def _point(mi: Any, light: Light, offset: np.ndarray, rgb: np.ndarray) -> dict[str, Any]:

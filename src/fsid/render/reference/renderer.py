@@ -23,7 +23,7 @@ from fsid.render.frame import Frame
 from fsid.render.parts import parts_of, turn
 from fsid.render.reference.bodies import Body, body_of, bsdf_of, pyramids
 from fsid.render.reference.dicing import View
-from fsid.render.reference.lights import emitters
+from fsid.render.reference.lights import emitters, surroundings
 from fsid.render.reference.variant import load_mitsuba
 from fsid.scene.model import Camera, Scene
 
@@ -103,9 +103,8 @@ class ReferenceRenderer:
             contents[name] = bodies[name].mesh
         for i, light in enumerate(scene.lights):
             contents |= emitters(mi, light, f"light{i}")
-        sky = scene.ambient if scene.sky is None else scene.sky.colour
-        if scene.background.kind == "open-air" and any(sky):
-            contents["sky"] = {"type": "constant", "radiance": {"type": "rgb", "value": list(sky)}}
+        if scene.background.kind == "open-air":
+            contents |= surroundings(mi, scene)
         contents["camera"] = _sensor(mi, camera, lens)
         return Prepared(mi, mi.load_dict(contents), camera, lens, bodies, self._bounces)
 
