@@ -16,7 +16,7 @@ from fsid.assets.patterns import cells, level, noise, shade, stack, warp
 from fsid.errors import FsidError
 
 MAPS = ("mix", "pattern", "detail", "roughness", "height", "metallic")
-SIZE = 256
+SIZE = 128
 
 
 @pytest.fixture(scope="module")

@@ -90,15 +90,27 @@ def cells(
     values = rng.random((count, count), dtype=np.float32)
     ring = np.arange(-1, count + 1) % count
     seeds_x, seeds_y = (seeds[ring][:, ring, k].ravel() for k in (0, 1))
+    table = (seeds_x, seeds_y, values[ring][:, ring].ravel())
     u, v = axes(size)
-    x = np.broadcast_to(u * count, (size, size))
-    y = np.broadcast_to(v * count, (size, size))
-    if shift is not None:
-        x, y = x + shift[0], y + shift[1]
+    out = np.empty((3, size, size), np.float32)
+    for top in range(0, size, 64):  # in strips, which stay in the processor's cache
+        rows = slice(top, top + 64)
+        x, y = np.broadcast_arrays(u * count, v[rows] * count)
+        if shift is not None:
+            x, y = x + shift[0][rows], y + shift[1][rows]
+        out[:, rows] = _nearest(x, y, count, table)
+    return out[0], out[1], out[2]
+
+
+def _nearest(
+    x: np.ndarray, y: np.ndarray, count: int, table: tuple[np.ndarray, np.ndarray, np.ndarray]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """`cells` at points in grid units. table: seeds' x, y and value of the grid with a ring of copies."""
+    seeds_x, seeds_y, values = table
     ix, iy = np.floor(x).astype(np.int32), np.floor(y).astype(np.int32)
     x, y = x - ix, y - iy
     home = (iy % count + 1) * (count + 2) + ix % count + 1
-    near = np.full((size, size), np.inf, np.float32)
+    near = np.full(x.shape, np.inf, np.float32)
     second, best = near.copy(), home.copy()
     for oy in (-1, 0, 1):
         for ox in (-1, 0, 1):
@@ -108,7 +120,7 @@ def cells(
             np.copyto(best, cell, where=distance < near)
             np.minimum(second, np.maximum(near, distance), out=second)
             np.minimum(near, distance, out=near)
-    return np.sqrt(near), np.sqrt(second), values[ring][:, ring].ravel()[best]
+    return np.sqrt(near), np.sqrt(second), values[best]
 
 
 def ink(size: int, marks: list[Draw], sharpness: int = 2) -> np.ndarray:

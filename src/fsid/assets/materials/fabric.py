@@ -111,7 +111,17 @@ def carpet(rng: np.random.Generator, variant: int, size: int) -> Layers:
     )
 
 
-@material_family("leather", tile_m=0.25, relief_m=0.0012)
+@material_family(
+    "leather",
+    tile_m=0.25,
+    relief_m=0.0012,
+    colours=(
+        "6b3f24 8a5632 c29a6a",
+        "2a2624 45403c 8a8078",
+        "a8703f c48f58 e0bf8f",
+        "5a2a24 7a3f36 b5806a",
+    ),
+)
 def leather(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """Pebbled hide: warped cells with deep creases between them, pores, darker patina in the creases."""
     count = (40, 60, 90, 28)[variant]

@@ -177,9 +177,9 @@ def foil(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """Crumpled foil: flat facets between sharp creases of several generations."""
     height = np.zeros((size, size), np.float32)
     tone = np.zeros_like(height)
+    bend = 0.35 * np.stack([noise(rng, size, 2.2, low=1, high=14) for _ in range(2)])
     for count, weight in ((3 + variant, 1.0), (9 + 2 * variant, 0.4), (26 + 5 * variant, 0.14)):
-        shift = 0.4 * np.stack([noise(rng, size, 2.2, low=1, high=count) for _ in range(2)])
-        near, second, value = cells(rng, size, count, 0.95, shift)
+        near, second, value = cells(rng, size, count, 0.95, bend * np.float32(count / 12))
         height += weight * (near - 0.4 * second + (0.8 * value - 0.4) * (second - near))
         tone += weight * value
     height = (height - height.min()) / np.ptp(height)

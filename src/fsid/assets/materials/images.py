@@ -198,7 +198,8 @@ def screen(rng: np.random.Generator, variant: int, size: int) -> Layers:
         if kind == 0:
             _program(rng, draw, (x + em, y + 2.3 * em, x + w, y + h), dark, em)
         elif kind == 1:
-            _paste(image, picture_rand(rng, int(h - 2.8 * em), int(w - em)), x + em / 2, y + 2.3 * em)
+            shown = picture_rand(rng, int(h - 2.8 * em) // 2, int(w - em) // 2).repeat(2, 0).repeat(2, 1)
+            _paste(image, shown, x + em / 2, y + 2.3 * em)
         else:
             for _ in range(int(rng.integers(2, 6))):
                 t = np.linspace(x + em, x + w - em, 120)

@@ -42,7 +42,7 @@ def scratched_metal(rng: np.random.Generator, variant: int, size: int) -> Layers
     )
 
 
-@material_family("rusty_metal", tile_m=0.6, relief_m=0.002)
+@material_family("rusty_metal", tile_m=0.6, relief_m=0.002, colours="8a8d90 a8572a 6b2f16")
 def rusty_metal(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """Rust that eats from blotches into metal, with runs along v and flaking grains of a few texels."""
     grains = noise(rng, size, 0.5, low=size / 20)
@@ -60,18 +60,19 @@ def rusty_metal(rng: np.random.Generator, variant: int, size: int) -> Layers:
     )
 
 
-@material_family("hammered_metal", tile_m=0.25, relief_m=0.0015)
+@material_family("hammered_metal", tile_m=0.25, relief_m=0.0022)
 def hammered_metal(rng: np.random.Generator, variant: int, size: int) -> Layers:
-    """Overlapping hammer dents; cast iron skin for variant 3."""
-    near, second, value = cells(rng, size, (10, 14, 20, 48)[variant], 0.85)
-    dents = np.clip(near, 0, 1) ** 2
-    skin = noise(rng, size, 0.6, low=size / 24)
-    dark = edge(0.12 - (second - near), 0, 0.12)
+    """Overlapping round dents of a hammer, tarnished where they meet."""
+    shift = 0.05 * np.stack([noise(rng, size, 1.8, low=2, high=20) for _ in range(2)])
+    near, second, value = cells(rng, size, (10, 16, 24, 7)[variant], 0.75, shift)
+    dent = np.clip(near**2 + 0.25 * value * (second - near), 0, 1)
+    skin = noise(rng, size, 0.9, low=size / 50)
+    tarnish = noise(rng, size, 1.7) - 3.0 * (second - near) + 0.6
     return Layers(
-        mix=0.5 * value,
-        pattern=0.5 * dark * level(skin),
-        detail=0.5 + (0.02, 0.02, 0.03, 0.08)[variant] * skin - 0.08 * dark,
-        roughness=(0.2, 0.28, 0.33, 0.55)[variant] + 0.04 * skin,
-        height=dents + 0.03 * skin,
-        metallic=(1.0, 1.0, 1.0, 0.6)[variant],
+        mix=np.clip(0.35 * level(noise(rng, size, 1.9)) + 0.2 * dent, 0, 1),
+        pattern=np.clip((0.25, 0.45, 0.35, 0.6)[variant] * edge(tarnish, 0.9, 1.6), 0, 1),
+        detail=0.5 + 0.012 * skin,
+        roughness=(0.2, 0.28, 0.33, 0.4)[variant] + 0.02 * skin + 0.1 * level(tarnish),
+        height=np.clip(0.1 + dent + 0.012 * skin, 0, 1),
+        metallic=1.0,
     )

@@ -8,7 +8,17 @@ from fsid.assets.material_registry import Layers, material_family
 from fsid.assets.patterns import axes, cells, edge, level, noise, scratches
 
 
-@material_family("marble", tile_m=0.8, relief_m=0.0002)
+@material_family(
+    "marble",
+    tile_m=0.8,
+    relief_m=0.0002,
+    colours=(
+        "e6e2dc d2ccc4 7a7672",
+        "d8d0c4 c0b4a4 8a5a44",
+        "3a3d40 55585c d9d6d0",
+        "5f7064 7f9084 e0e0d8",
+    ),
+)
 def marble(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """Veins are the zero crossings of noise, thin and of three scales, over clouded ground."""
     cloud = noise(rng, size, 1.7)
@@ -27,7 +37,17 @@ def marble(rng: np.random.Generator, variant: int, size: int) -> Layers:
     )
 
 
-@material_family("granite", tile_m=0.3, relief_m=0.0006)
+@material_family(
+    "granite",
+    tile_m=0.3,
+    relief_m=0.0006,
+    colours=(
+        "b0a8a0 8a8480 2f2c2c",
+        "c09a8c a57a6e 3a302e",
+        "7a8288 9aa0a4 22262a",
+        "d0ccc4 b5b0a8 5a4a42",
+    ),
+)
 def granite(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """Interlocking grains of three minerals, some of one texel."""
     shift = 0.3 * np.stack([noise(rng, size, 1.6, low=20, high=300) for _ in range(2)])
@@ -43,7 +63,17 @@ def granite(rng: np.random.Generator, variant: int, size: int) -> Layers:
     )
 
 
-@material_family("terrazzo", tile_m=0.6, relief_m=0.0003)
+@material_family(
+    "terrazzo",
+    tile_m=0.6,
+    relief_m=0.0003,
+    colours=(
+        "d8d2c6 a89a88 5f5a56",
+        "c2b8ac e0dcd4 8a4a3a",
+        "e8e4dc 9aa59c 3f5a52",
+        "7a7672 b5aea4 e0d8cc",
+    ),
+)
 def terrazzo(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """Angular chips of two sizes in a cement ground, polished."""
     shift = 0.12 * np.stack([noise(rng, size, 2.0, low=8, high=150) for _ in range(2)])
@@ -61,7 +91,7 @@ def terrazzo(rng: np.random.Generator, variant: int, size: int) -> Layers:
     )
 
 
-@material_family("concrete", tile_m=1.2, relief_m=0.003)
+@material_family("concrete", tile_m=1.2, relief_m=0.003, colours="9a9892 b0aea6 6b6862")
 def concrete(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """Cast concrete: cement stains, air holes, sand grains of a texel, hair cracks, formwork joints."""
     stains = noise(rng, size, 1.6)
@@ -82,7 +112,17 @@ def concrete(rng: np.random.Generator, variant: int, size: int) -> Layers:
     )
 
 
-@material_family("brick", tile_m=1.0, relief_m=0.012)
+@material_family(
+    "brick",
+    tile_m=1.0,
+    relief_m=0.012,
+    colours=(
+        "9a4a38 b5694f c2b8a8",
+        "8a3f30 a85a45 d0c8bc",
+        "c9a078 dcc09a 8f8578",
+        "7a5a4a 94705c b0a89c",
+    ),
+)
 def brick(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """Running bond with rough mortar; every brick has its own shade and broken edges."""
     rows, columns = (14, 12, 16, 10)[variant], (4, 4, 8, 3)[variant]

@@ -26,7 +26,17 @@ def _leaf_outlines(
     return out
 
 
-@material_family("grass", tile_m=0.5, relief_m=0.01)
+@material_family(
+    "grass",
+    tile_m=0.5,
+    relief_m=0.01,
+    colours=(
+        "4a6b24 6f8f38 b5a85a",
+        "56752c 86a048 c2b36a",
+        "7a8a3a a5a850 d0bf7a",
+        "9a8f4a bfae6a dccb8f",
+    ),
+)
 def grass(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """Blades over blades; longer and drier with the variant."""
     count = (4200, 3200, 2400, 1700)[variant]
@@ -43,7 +53,17 @@ def grass(rng: np.random.Generator, variant: int, size: int) -> Layers:
     )
 
 
-@material_family("leaves", tile_m=0.6, relief_m=0.012)
+@material_family(
+    "leaves",
+    tile_m=0.6,
+    relief_m=0.012,
+    colours=(
+        "4f6f2a 7a9a3f 8f5a2a",
+        "5f7f38 8aa850 b59a3f",
+        "3f5f2f 648a45 a86a34",
+        "a5602a c98a3f 6f3a1f",
+    ),
+)
 def leaves(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """Broad leaves over each other, each with a midrib and side veins."""
     count = (420, 700, 260, 1100)[variant]
@@ -100,7 +120,17 @@ def dead_leaves(rng: np.random.Generator, variant: int, size: int) -> Layers:
     )
 
 
-@material_family("bark", tile_m=0.5, relief_m=0.015)
+@material_family(
+    "bark",
+    tile_m=0.5,
+    relief_m=0.015,
+    colours=(
+        "6b5a48 8f7a62 8a9a6a",
+        "7a6a58 a08c74 b5b5a0",
+        "5a4636 7d6248 6f7f4a",
+        "8f8578 b0a698 c9b890",
+    ),
+)
 def bark(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """Ridges along v between warped cracks; flat plates for odd variants."""
     bend = noise(rng, size, 1.8, low=2, high=30, stretch=(1, 3)) * 0.03
@@ -118,7 +148,17 @@ def bark(rng: np.random.Generator, variant: int, size: int) -> Layers:
     )
 
 
-@material_family("gravel", tile_m=0.5, relief_m=0.02)
+@material_family(
+    "gravel",
+    tile_m=0.5,
+    relief_m=0.02,
+    colours=(
+        "9a9088 7a726a c9c0b0",
+        "8a7a6c 6b5e54 d8d0c4",
+        "6f7478 55595c b5b0a8",
+        "b59a7a 8f765a e0d4be",
+    ),
+)
 def gravel(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """Pebbles in shadowed gaps, with smaller ones between them."""
     count = (18, 26, 40, 12)[variant]
@@ -139,7 +179,17 @@ def gravel(rng: np.random.Generator, variant: int, size: int) -> Layers:
     )
 
 
-@material_family("sand", tile_m=0.4, relief_m=0.006)
+@material_family(
+    "sand",
+    tile_m=0.4,
+    relief_m=0.006,
+    colours=(
+        "d2b98c e3d0a8 8a7350",
+        "c9a878 dfc49c 6b5a45",
+        "e0d0b0 f0e4cc a8987a",
+        "a58a68 c2a882 5f4f3c",
+    ),
+)
 def sand(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """Single grains of one to three texels, some dark or glittering, over wind ripples."""
     _, v = axes(size)
@@ -156,7 +206,17 @@ def sand(rng: np.random.Generator, variant: int, size: int) -> Layers:
     )
 
 
-@material_family("fur", tile_m=0.3, relief_m=0.005)
+@material_family(
+    "fur",
+    tile_m=0.3,
+    relief_m=0.005,
+    colours=(
+        "8a6a45 b08f62 3a2a1c",
+        "d9c4a0 efe4cc 6b4a2c",
+        "5f5a54 8a857c 2a2624",
+        "b5763a d99f5c f2e8d8",
+    ),
+)
 def fur(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """Hair combed along a slowly turning direction, with coat markings."""
     bend = noise(rng, size, 2.2, low=1, high=8) * (0.03, 0.05, 0.08, 0.12)[variant]

@@ -35,7 +35,7 @@ def plastic(rng: np.random.Generator, variant: int, size: int) -> Layers:
     )
 
 
-@material_family("plaster", tile_m=1.2, relief_m=0.004)
+@material_family("plaster", tile_m=1.2, relief_m=0.004, colours="ddd5c6 cbbfaa a8987f")
 def plaster(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """Trowelled or sprayed plaster: ridges of overlapping strokes over fine sand."""
     sand = noise(rng, size, 0.3, low=size / 16)

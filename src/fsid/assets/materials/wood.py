@@ -15,7 +15,17 @@ def _fibres(rng: np.random.Generator, size: int) -> tuple[np.ndarray, np.ndarray
     return bands, pores
 
 
-@material_family("wood_planks", tile_m=1.0, relief_m=0.003)
+@material_family(
+    "wood_planks",
+    tile_m=1.0,
+    relief_m=0.003,
+    colours=(
+        "9a6b42 b98a5c 3a2818",
+        "6f4a30 8f6544 22160c",
+        "b59468 cfb288 5a4630",
+        "8a8278 a59c90 4a443c",
+    ),
+)
 def wood_planks(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """Floor boards along u with staggered ends; each board cut from its own place of the grain."""
     rows = (6, 8, 10, 16)[variant]
@@ -39,7 +49,17 @@ def wood_planks(rng: np.random.Generator, variant: int, size: int) -> Layers:
     )
 
 
-@material_family("wood_grain", tile_m=0.5, relief_m=0.0008)
+@material_family(
+    "wood_grain",
+    tile_m=0.5,
+    relief_m=0.0008,
+    colours=(
+        "a8743f c9955a 4a2e18",
+        "7a4f2f a06f45 2f1c0e",
+        "c9a06a e0be8a 6b4a28",
+        "8f6038 b5854f 3a2412",
+    ),
+)
 def wood_grain(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """One cut of wood: growth rings warped by noise; straight for variant 0, burl for 3."""
     _, v = axes(size)
@@ -58,7 +78,17 @@ def wood_grain(rng: np.random.Generator, variant: int, size: int) -> Layers:
     )
 
 
-@material_family("parquet", tile_m=1.2, relief_m=0.002)
+@material_family(
+    "parquet",
+    tile_m=1.2,
+    relief_m=0.002,
+    colours=(
+        "a8743f c9955a 3a2616",
+        "7a4a2a 96623a 24140a",
+        "c9a878 dfc49a 5a4226",
+        "8f5a34 ae7a4c 2a180c",
+    ),
+)
 def parquet(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """Basket-weave parquet: squares of parallel strips that alternate in direction."""
     squares, strips = (8, 6, 4, 6)[variant], (4, 5, 7, 3)[variant]
