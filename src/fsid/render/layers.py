@@ -25,8 +25,8 @@ from fsid.render.programs import load_compute
 Bake = Callable[[str, int, int], MaterialMaps]
 """(family, variant, size) -> maps."""
 
-BUDGET_BYTES = 1600 * 2**20
-"""Texture memory: 146 layers of 1024 texels, four times as many of 512; a scene that needs more gets more."""
+BUDGET_BYTES = 640 * 2**20
+"""Texture memory: 60 layers of 1024 texels, four times as many of 512; a scene that needs more gets more."""
 
 _RGBA8 = 0x8058
 _STEP_LAYERS = 16
