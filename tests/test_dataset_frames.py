@@ -35,7 +35,7 @@ class Painter:
     def __init__(self, bad: int = 0) -> None:
         self.frames, self._bad = 0, bad
 
-    def render(self, scene: Scene, camera_index: int = 0) -> Frame:
+    def render(self, scene: Scene, camera_index: int = 0, flow_to: int | None = None) -> Frame:
         camera = scene.cameras[camera_index]
         rng = np.random.default_rng(scene.seed)
         coarse = rng.uniform(0.05, 1.0, (camera.height // 8 + 1, camera.width // 8 + 1, 3))
@@ -99,12 +99,12 @@ def test_frames_that_never_pass_are_one_line() -> None:
     with pytest.raises(FsidError, match=r"frame 0: 8 attempts were refused \(not finite"):
         make_frame(config(), 0, 0, Painter(bad=100))
     with pytest.raises(FsidError, match="black"):
-        make_frame(config("checks.black_share=0", "scene.ambient_share=[0.0001,0.0001]"), 0, 0, Dark())
+        make_frame(config("checks.black_share=0"), 0, 0, Dark())
 
 
 class Dark(Painter):
-    def render(self, scene: Scene, camera_index: int = 0) -> Frame:
-        frame = super().render(scene, camera_index)
+    def render(self, scene: Scene, camera_index: int = 0, flow_to: int | None = None) -> Frame:
+        frame = super().render(scene, camera_index, flow_to)
         light = np.where(np.arange(frame.radiance.shape[1])[:, None] < 40, 0, frame.radiance)
         return replace(frame, radiance=light.astype(np.float32))
 

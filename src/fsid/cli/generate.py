@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import shlex
 import shutil
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -17,7 +19,9 @@ if TYPE_CHECKING:
     from fsid.dataset import Estimate
 
 Variant = Literal["objects", "materials", "objects-materials", "full"]
-Task = Literal["denoise", "super-resolution"]
+Task = Literal["denoise", "super-resolution", "deblur", "burst"]
+RendererName = Literal["raster", "reference"]
+Quality = Literal["high", "fast"]
 
 
 def generate(
@@ -31,6 +35,8 @@ def generate(
     height: int | None = None,
     variant: Variant | None = None,
     task: Task | None = None,
+    renderer: RendererName | None = None,
+    quality: Quality | None = None,
     images: Path | None = None,
     workers: int = 1,
     ray: str = "",
@@ -54,7 +60,11 @@ def generate(
         height: Height of a frame in pixels (default 1080).
         variant: What varies between scenes: objects, materials, both, or everything (default full).
         task: What the pairs are for (default denoise). super-resolution: KEY.noisy.dng has half the width and
-            height (--set scale=4: a quarter), KEY.degraded.dng is the same without noise.
+            height (--set scale=4: a quarter), deblur: camera and objects move while the shutter is open;
+            KEY.degraded.dng is KEY.noisy.dng without noise. burst: KEY.noisy1.dng ... are further frames,
+            KEY.flow1.npy ... the way from each to KEY.noisy.dng in pixels right and down.
+        renderer: raster (OpenGL, default) or reference (a path tracer: slow).
+        quality: Of the rasteriser: high (default) or fast.
         images: Folder of photographs, or of linear .exr renders of any engine, to take instead
             of scenes; frames are random windows of at most WIDTH x HEIGHT pixels.
         workers: Number of processes (of the whole cluster with --ray); the result does not depend on it.
@@ -74,6 +84,8 @@ def generate(
         "height": height,
         "variant": variant,
         "task": task,
+        "renderer": renderer,
+        "quality": quality,
         "images": images and os.fspath(images),
     }
     overrides = [*set, *(f"{key}={value}" for key, value in given.items() if value is not None)]
@@ -99,6 +111,7 @@ def generate(
             workforce=workforce,
             progress=progress,
             lost=progress.failed,
+            command=shlex.join(["fsid", *sys.argv[1:]]),
         )
     console.print(f"{out}: {count} pairs, {made} of them new")
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -19,9 +19,8 @@ from fsid.config import to_plain
 from fsid.dataset.checks import distance, fingerprint, flaw
 from fsid.dataset.config import GenerateConfig, split_of
 from fsid.dataset.pictures import find_pictures, read_picture
-from fsid.dataset.tasks import Views, smaller
+from fsid.dataset.tasks import SceneRenderer, Views, scene_config, views_of_light, views_of_scene
 from fsid.errors import FsidError
-from fsid.render import Frame
 from fsid.scene import Scene
 from fsid.scene import sample as sample_scene
 from fsid.sensor import (
@@ -40,25 +39,20 @@ Window = tuple[int, int, int, int]
 """Left, top, width, height in pixels of the truth."""
 
 
-class SceneRenderer(Protocol):
-    """Anything that turns a scene into a frame."""
-
-    def render(self, scene: Scene, camera_index: int = 0) -> Frame: ...
-
-
 @dataclass(frozen=True)
 class Sample:
     """A pair and its record. `record` is plain data (JSON).
 
     more: what a task adds, by the name of its file: `degraded`, the noise-free image behind `noisy` where
-    that is not `clean`.
+    that is not `clean`; `noisy1` ..., the further frames of a burst; `flow1` ..., (H, W, 2) float16, pixels
+    right and down from each of them to the first.
     """
 
     key: str
     clean: Raw
     noisy: Raw
     record: dict[str, Any]
-    more: dict[str, Raw] = field(default_factory=dict)
+    more: dict[str, Raw | np.ndarray] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -73,11 +67,11 @@ class Attempt:
 
     def samples(self, renderer: SceneRenderer | None) -> list[Sample] | str:
         """All samples of the frame, or what is wrong with it."""
-        light = self._light(renderer)
-        if not np.isfinite(light.image).all():
+        source = self._source(renderer)
+        views = source.views
+        if not all(np.isfinite(image).all() for image in (views.truth, *views.seen)):
             return "not finite"
-        views = self._views(light)
-        shots = [self._shot(views, light, number) for number in range(self.config.exposures)]
+        shots = [self._shot(source, number) for number in range(self.config.exposures)]
         samples: list[Sample] = []
         looks: list[str] = []
         for crop in range(self.config.crops):
@@ -88,13 +82,14 @@ class Attempt:
             looks.append(fingerprint(clean[0]))
             if not self.config.images and self._is_old(looks):
                 return "near-duplicate"
-            facts = {"window": list(window), "fingerprint": looks[-1], **views.facts, **light.facts}
+            facts = {"window": list(window), "fingerprint": looks[-1], **views.facts, **source.facts}
+            flow = {f"flow{i}": _cut(each, window) for i, each in enumerate(views.flow, 1)}
             for exposure, shot in enumerate(shots):
                 inputs = [
                     clean[exposure] if image is views.truth else shot.clean(_cut(image, window, views.scale))
                     for image in views.seen
                 ]
-                samples += self._pairs((crop, exposure), shot, clean[exposure], inputs, facts)
+                samples += self._pairs((crop, exposure), shot, clean[exposure], inputs, flow, facts)
         return samples
 
     def drawn_scene(self) -> Scene:
@@ -104,42 +99,34 @@ class Attempt:
         config = self.config
         seed = int(self._stream(_SCENE).generate_state(1, np.uint64)[0] >> np.uint64(1))
         return sample_scene(
-            config.scene, seed, width=config.width, height=config.height, variant=config.variant
+            scene_config(config), seed, width=config.width, height=config.height, variant=config.variant
         )
 
     def _is_old(self, looks: list[str]) -> bool:
         near = self.config.checks.duplicate_bits
         return any(distance(looks[-1], other) <= near for other in looks[:-1])
 
-    def _light(self, renderer: SceneRenderer | None) -> _Light:
-        if not self.config.images:
+    def _source(self, renderer: SceneRenderer | None) -> _Source:
+        config, rng = self.config, self._rng(_TASK)
+        if not config.images:
             if renderer is None:
                 raise ValueError("a renderer is needed to make samples from scenes")
             scene = self.drawn_scene()
-            facts = {"split": split_of(self.config, self.frame), "scene": to_plain(scene)}
-            return _Light(renderer.render(scene).radiance, facts, is_linear=True)
-        paths = find_pictures(Path(self.config.images))
+            facts = {"split": split_of(config, self.frame), "scene": to_plain(scene)}
+            return _Source(views_of_scene(rng, config, scene, renderer), facts, is_linear=True)
+        paths = find_pictures(Path(config.images))
         number = self.frame % len(paths)
         picture = read_picture(paths[number])
-        window = _window_rand(
-            self._rng(_SCENE), picture.pixels, self.config.width, self.config.height, step=2
-        )
-        facts = {"split": split_of(self.config, number), "image": picture.path.name}
-        return _Light(_cut(picture.pixels, window), facts, picture.is_linear)
+        window = _window_rand(self._rng(_SCENE), picture.pixels, config.width, config.height, step=2)
+        facts = {"split": split_of(config, number), "image": picture.path.name}
+        if not picture.is_linear and config.task != "denoise":
+            raise FsidError(f"--task {config.task}: needs scenes or linear .exr pictures, not photographs")
+        return _Source(views_of_light(rng, config, _cut(picture.pixels, window)), facts, picture.is_linear)
 
-    def _views(self, light: _Light) -> Views:
-        if self.config.task == "super-resolution":
-            if not light.is_linear:
-                raise FsidError(
-                    "--task super-resolution: needs scenes or linear .exr pictures, not photographs"
-                )
-            return smaller(self._rng(_TASK), light.image, self.config.scale)
-        return Views(light.image, (light.image,))
-
-    def _shot(self, views: Views, light: _Light, number: int) -> _Shot:
+    def _shot(self, source: _Source, number: int) -> _Shot:
         rng = self._rng(_EXPOSURE, number)
         profile = load_profile(self.config.cameras[rng.integers(len(self.config.cameras))])
-        gain = exposure_rand(rng, views.truth) if light.is_linear else None
+        gain = exposure_rand(rng, source.views.truth) if source.is_linear else None
         return _Shot(profile, gain, self._stream(_COLOUR, number))
 
     def _window(self, views: Views, number: int) -> Window:
@@ -148,7 +135,13 @@ class Attempt:
         return _window_rand(rng, views.truth, width or None, height or None, step=2 * views.scale)
 
     def _pairs(
-        self, place: tuple[int, int], shot: _Shot, clean: Raw, inputs: list[Raw], facts: dict[str, Any]
+        self,
+        place: tuple[int, int],
+        shot: _Shot,
+        clean: Raw,
+        inputs: list[Raw],
+        flow: dict[str, np.ndarray],
+        facts: dict[str, Any],
     ) -> Iterator[Sample]:
         """One sample per noise level of a crop and exposure."""
         config, profile = self.config, shot.profile
@@ -156,7 +149,7 @@ class Attempt:
         for number in range(config.noise_levels):
             rng = self._rng(_NOISE, crop, exposure, number)
             iso, level = level_rand(rng, profile, config.iso_range)
-            noisy, *_ = (noisy_from_clean(rng, raw, iso, level, profile.terms) for raw in inputs)
+            noisy, *others = (noisy_from_clean(rng, raw, iso, level, profile.terms) for raw in inputs)
             index = (
                 (self.frame * config.crops + crop) * config.exposures + exposure
             ) * config.noise_levels + number
@@ -181,7 +174,10 @@ class Attempt:
                 **facts,
                 "settings": to_plain(config),
             }
-            more = {} if inputs[0] is clean else {"degraded": inputs[0]}
+            more: dict[str, Raw | np.ndarray] = {f"noisy{i}": raw for i, raw in enumerate(others, 1)}
+            if inputs[0] is not clean:
+                more["degraded"] = inputs[0]
+            more |= {name: each.astype(np.float16) for name, each in flow.items()}
             yield Sample(sample_key(index), clean, noisy, record, more)
 
     def _stream(self, *place: int) -> np.random.SeedSequence:
@@ -192,10 +188,10 @@ class Attempt:
 
 
 @dataclass(frozen=True)
-class _Light:
-    """What a frame is made of: (H, W, 3), from a scene or a picture, and where it is from."""
+class _Source:
+    """What a frame is made of, a scene or a picture, and where it is from."""
 
-    image: np.ndarray
+    views: Views
     facts: dict[str, Any]
     is_linear: bool
 

@@ -15,9 +15,10 @@ from fsid.config import load_settings
 from fsid.errors import FsidError
 from fsid.scene import VARIANTS, SceneConfig
 
-TASKS = ("denoise", "super-resolution")
+TASKS = ("denoise", "super-resolution", "deblur", "burst")
+RENDERERS = ("raster", "reference")
+QUALITIES = ("high", "fast")
 _POSITIVE = ("crops", "exposures", "noise_levels")
-_MAX_FRAMES = 32
 
 
 @dataclass(frozen=True)
@@ -46,15 +47,16 @@ class Checks:
 class GenerateConfig:
     """Settings of `fsid generate`; `width` and `height` in pixels, even (the CFA is 2x2).
 
-    task: one of TASKS, see `tasks`. scale: of super-resolution, 2 or 4. frames: of a burst.
+    task: one of TASKS, see `tasks`. scale: of super-resolution, 2 or 4.
     cameras: noise profiles, built-in names or files; each exposure draws one.
     iso_range: lowest and highest ISO, drawn log-uniformly.
     crops, exposures, noise_levels: how many of each a frame gives; it gives their product of pairs. All crops
     of a frame share its exposures (camera, colour, brightness), and each pair has noise of its own.
     crop_width, crop_height: pixels; 0 takes the whole frame.
     validation_every: every so-manieth scene (or photograph) is for validation, all its pairs; 0: none.
-    supersampling: edge of the grid of samples per pixel. texture_size: pixels per
-    edge of a baked material, a power of two; 0 follows the width (see `texture_px`).
+    renderer: raster (OpenGL), or reference (path tracer: slow, and its noise is in the clean image).
+    quality: of the rasteriser, high or fast. supersampling: edge of the grid of samples per pixel.
+    texture_size: pixels per edge of a baked material, a power of two; 0 follows the width (see `texture_px`).
     images: a folder of photographs or linear .exr renders to use instead of scenes ("" renders scenes).
     """
 
@@ -63,7 +65,6 @@ class GenerateConfig:
     variant: str = "full"
     task: str = "denoise"
     scale: int = 2
-    frames: int = 5
     cameras: tuple[str, ...] = ("pixel6", "galaxy-s22")
     iso_range: tuple[float, float] = (400.0, 8000.0)
     crops: int = 1
@@ -72,6 +73,8 @@ class GenerateConfig:
     exposures: int = 1
     noise_levels: int = 1
     validation_every: int = 0
+    renderer: str = "raster"
+    quality: str = "high"
     supersampling: int = 2
     texture_size: int = 0
     images: str = ""
@@ -84,9 +87,12 @@ class GenerateConfig:
             if size < 32 or size % 2:
                 raise FsidError(f"{key}: {size} is not an even number of at least 32 pixels")
             self._check_crop(f"crop_{key}", size)
-        for key, known in (("variant", VARIANTS), ("task", TASKS)):
+        choices = {"variant": VARIANTS, "task": TASKS, "renderer": RENDERERS, "quality": QUALITIES}
+        for key, known in choices.items():
             if getattr(self, key) not in known:
                 raise FsidError(f"{key}: {getattr(self, key)!r} is not one of {', '.join(known)}")
+        if self.task == "burst" and self.renderer != "raster":
+            raise FsidError(f"renderer: {self.renderer!r} knows no flow; --task burst needs raster")
         low, high = self.iso_range
         if not 0 < low <= high:
             raise FsidError(f"iso_range: [{low}, {high}] must be two positive numbers, the lower first")
@@ -99,8 +105,6 @@ class GenerateConfig:
             raise FsidError(f"validation_every: {self.validation_every} is negative; 0 means no validation")
         if self.scale not in (2, 4):
             raise FsidError(f"scale: {self.scale} is neither 2 nor 4")
-        if not 2 <= self.frames <= _MAX_FRAMES:
-            raise FsidError(f"frames: {self.frames} is not between 2 and {_MAX_FRAMES}")
         if not 1 <= self.supersampling <= 4:
             raise FsidError(f"supersampling: {self.supersampling} is not between 1 and 4")
         if self.texture_size and (not 64 <= self.texture_size <= 4096 or self.texture_size.bit_count() != 1):

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fsid.config import from_plain, read_yaml, save_settings, to_plain
+from fsid.dataset.card import CARD, write_card
 from fsid.dataset.config import DatasetConfig, GenerateConfig
 from fsid.dataset.crew import Crew, LocalCrew, run
 from fsid.dataset.pictures import find_pictures
@@ -89,12 +90,14 @@ def generate(
     progress: Callable[[int, int], None] = lambda done, total: None,
     workforce: Workforce | None = None,
     lost: Callable[[str], None] = lambda line: None,
+    command: str = "",
 ) -> int:
     """Make the samples 0 .. count-1 that `out` lacks; returns how many were made.
 
     workers: short for Workforce(workers). shard_size: samples, a multiple of `config.pairs_per_frame`; 0
     takes the first from SHARD_SIZE on. progress(done, total): samples, called at the start and after every
-    shard. lost(line): called for every worker that died; its shard is made again by another.
+    shard. lost(line): called for every worker that died; its shard is made again by another. command: for
+    the dataset card, README.md, which is written when all samples are there.
     Raises FsidError where `out` already holds a dataset of another configuration or seed, where another
     process fills it, where the disk refuses, or where a shard kills its worker again and again.
     """
@@ -110,6 +113,7 @@ def generate(
         progress(done, count)
         tasks_per_worker = max(1, SAMPLES_PER_WORKER // dataset.shard_size)
         if todo:
+            (out / CARD).unlink(missing_ok=True)
             for _, made in run(workforce.crew(), todo, tasks_per_worker=tasks_per_worker, lost=lost):
                 done += made
                 progress(done, count)
@@ -118,7 +122,9 @@ def generate(
         def redraw(task: Settle) -> None:
             list(run(workforce.crew(), [task], tasks_per_worker=1, lost=lost))
 
-        settle(shards, config, seed, redraw)
+        if todo or not (out / CARD).exists():
+            settle(shards, config, seed, redraw)
+            write_card(out, dataset, shards, command)
     return total
 
 

@@ -10,7 +10,7 @@ from fsid.dataset.attempt import Sample
 from fsid.dataset.config import DatasetConfig, GenerateConfig
 from fsid.dataset.sample import encode, make_sample, remake
 from fsid.dataset.shards import read_records, shard_path
-from fsid.dataset.worker import Worker
+from fsid.dataset.worker import rendering
 from fsid.errors import FsidError
 from fsid.files import write_atomically
 
@@ -57,10 +57,12 @@ def _from_key(out: Path, key: str, config: GenerateConfig | None, seed: int) -> 
         if found := next((record for record in records if record["index"] == index), None):
             return _remake(found)
     config = config or GenerateConfig()
-    return make_sample(config, seed, index, Worker(None).renderer(config))
+    with rendering(config) as renderer:
+        return make_sample(config, seed, index, renderer)
 
 
 def _remake(record: dict) -> Sample:
     settings = record.get("settings") if isinstance(record, dict) else None
     config = from_plain(GenerateConfig, settings or {}, source="settings")
-    return remake(record, Worker(None).renderer(config))
+    with rendering(config) as renderer:
+        return remake(record, renderer)

@@ -11,8 +11,8 @@ from PIL import Image
 
 from fsid.dataset.config import GenerateConfig
 from fsid.dataset.sample import make_sample, to_uint8
+from fsid.dataset.worker import rendering
 from fsid.errors import FsidError
-from fsid.render import Renderer
 from fsid.sensor import develop
 
 GAP_PX = 4
@@ -49,7 +49,7 @@ def contact_sheet(
         raise FsidError(f"--count {count}: at least one scene is needed")
     config = replace(config, crops=1, crop_width=0, crop_height=0, exposures=1, noise_levels=1)
     tiles = []
-    with Renderer(supersampling=config.supersampling, texture_size=config.texture_px) as renderer:
+    with rendering(config) as renderer:
         for i in range(count):
             progress(i, count)
             tiles.append(to_uint8(develop(make_sample(config, seed, i, renderer).clean)))

@@ -16,8 +16,9 @@ import numpy as np
 from PIL import Image
 
 from fsid.config import from_plain
-from fsid.dataset.attempt import Attempt, Sample, SceneRenderer
+from fsid.dataset.attempt import Attempt, Sample
 from fsid.dataset.config import GenerateConfig
+from fsid.dataset.tasks import SceneRenderer
 from fsid.errors import FsidError
 from fsid.scene import Scene, scene_from_json
 from fsid.sensor import Raw, clean_levels, develop, write_dng
@@ -83,10 +84,18 @@ def encode(sample: Sample) -> dict[str, bytes]:
     return {
         "clean.dng": _dng(clean_levels(sample.clean)),
         "noisy.dng": _dng(sample.noisy),
-        **{f"{name}.dng": _dng(clean_levels(raw)) for name, raw in sample.more.items()},
+        **dict(_further_file(name, content) for name, content in sample.more.items()),
         "rgb.png": _png(preview),
         "json": json.dumps(sample.record).encode(),
     }
+
+
+def _further_file(name: str, content: Raw | np.ndarray) -> tuple[str, bytes]:
+    if isinstance(content, Raw):
+        return f"{name}.dng", _dng(clean_levels(content) if name == "degraded" else content)
+    file = io.BytesIO()
+    np.save(file, content, allow_pickle=False)
+    return f"{name}.npy", file.getvalue()
 
 
 def to_uint8(srgb: np.ndarray) -> np.ndarray:

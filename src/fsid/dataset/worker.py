@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from typing import Any, Protocol
 
 from fsid.dataset.config import GenerateConfig
+from fsid.dataset.tasks import SceneRenderer
 from fsid.render import Renderer
 
 
@@ -13,23 +16,36 @@ class Worker:
 
     def __init__(self, gpu: int | None) -> None:
         self._gpu = gpu
-        self._renderer: Renderer | None = None
+        self._open = ExitStack()
+        self._renderer: SceneRenderer | None = None
 
     def __call__(self, task: Task) -> Any:
         return task.do(self)
 
-    def renderer(self, config: GenerateConfig) -> Renderer | None:
-        """The renderer that makes the frames of `config`; None where they come from pictures.
-
-        All tasks of a worker are of one dataset, so its settings do not change.
-        """
-        if config.images:
-            return None
+    def renderer(self, config: GenerateConfig) -> SceneRenderer | None:
+        """The renderer of `config`, kept open: all tasks of a worker are of one dataset."""
         if self._renderer is None:
-            self._renderer = Renderer(
-                device_index=self._gpu, supersampling=config.supersampling, texture_size=config.texture_px
-            )
+            self._renderer = self._open.enter_context(rendering(config, self._gpu))
         return self._renderer
+
+
+@contextmanager
+def rendering(config: GenerateConfig, gpu: int | None = None) -> Iterator[SceneRenderer | None]:
+    """The renderer that makes the frames of `config`, None for pictures. FsidError if it cannot run."""
+    if config.images:
+        yield None
+    elif config.renderer == "reference":
+        from fsid.render.reference import ReferenceRenderer
+
+        yield ReferenceRenderer(texture_size=config.texture_px)
+    else:
+        with Renderer(
+            device_index=gpu,
+            supersampling=config.supersampling,
+            texture_size=config.texture_px,
+            quality=config.quality,
+        ) as renderer:
+            yield renderer
 
 
 class Task(Protocol):

@@ -1,0 +1,162 @@
+"""The dataset card: README.md beside the shards of a finished dataset, from its records alone.
+
+What is in it, from what it was made and under which licences, how often the checks refused a frame, and the
+command that makes it again. No clock and no machine: the same dataset has the same card.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+from fsid import __version__
+from fsid.dataset.config import DatasetConfig
+from fsid.dataset.picture import grid
+from fsid.dataset.shards import read_member, read_records, shard_keys
+from fsid.files import write_atomically
+
+CARD, SHEET = "README.md", "samples.png"
+_TILES, _TILE_PX = 12, 240
+_FAMILIES_SHOWN = 200
+
+
+@dataclass
+class _Tally:
+    """What the records of a dataset say, added up."""
+
+    counts: dict[str, Counter[str]] = field(default_factory=dict)
+    isos: list[float] = field(default_factory=list)
+    frames: set[int] = field(default_factory=set)
+
+    def add(self, record: dict[str, Any]) -> None:
+        self._count("split", record["split"])
+        self._count("camera", record["camera"])
+        self.isos.append(record["iso"])
+        if record["frame"] in self.frames:
+            return
+        self.frames.add(record["frame"])
+        for reason in record["refused"]:
+            self._count("refused", reason)
+        if "image" in record:
+            self._count("picture", record["image"])
+        scene = record.get("scene", {"objects": (), "materials": (), "background": None})
+        for item in scene["objects"]:
+            self._count("mesh", item["family"])
+        for materials in scene["materials"]:
+            for material in materials:
+                self._count("material", material["family"])
+        if scene["background"]:
+            self._count("background", scene["background"]["kind"])
+            for material in scene["background"]["materials"].values():
+                self._count("material", material["family"])
+        if scene.get("sky"):
+            self._count("sky", scene["sky"]["source"])
+
+    def _count(self, what: str, which: str) -> None:
+        self.counts.setdefault(what, Counter())[which] += 1
+
+
+def write_card(out: Path, dataset: DatasetConfig, shards: Sequence[Path], command: str) -> None:
+    """Write README.md and samples.png of the dataset in `out`. command: what made it, "" where unknown."""
+    tally = _Tally()
+    for shard in shards:
+        for record in read_records(shard):
+            tally.add(record)
+    write_atomically(out / SHEET, _sheet(shards))
+    write_atomically(out / CARD, _text(dataset, tally, command).encode())
+
+
+def _text(dataset: DatasetConfig, tally: _Tally, command: str) -> str:
+    config = dataset.generate
+    splits, refused = tally.counts["split"], tally.counts.get("refused", Counter())
+    drawn = len(tally.frames) + refused.total()
+    lowest, middle, highest = np.percentile(tally.isos, (0, 50, 100))
+    size = f"{config.crop_width or config.width} x {config.crop_height or config.height}"
+    lines = [
+        "# RAW pairs made by FSID",
+        "",
+        f"{len(tally.isos)} pairs for {config.task}, {size} pixels at most, from {len(tally.frames)} "
+        f"{'pictures' if config.images else 'rendered scenes'} (fsid {__version__}, seed {dataset.seed}). "
+        "WebDataset shards; `config.yaml` has every setting, each pair's JSON all that makes it again.",
+        "",
+        f"![Some of the clean images, developed]({SHEET})",
+        "",
+        "| | |",
+        "|---|---|",
+        *(f"| {name} | {count} pairs |" for name, count in sorted(splits.items())),
+        f"| cameras | {_listed(tally.counts['camera'], 'pairs')} |",
+        f"| ISO | {lowest:.0f} to {highest:.0f}, median {middle:.0f} |",
+        f"| variant | {config.variant} |",
+        f"| backgrounds | {_listed(tally.counts.get('background', Counter()), 'scenes')} |",
+        f"| refused by the checks | {refused.total()} of {drawn} frames: {_listed(refused, 'times')} |",
+        "",
+        "## Sources and licences",
+        "",
+        *_sources(tally),
+    ]
+    if command:
+        lines += ["", "## Made with", "", "```sh", command, "```"]
+    return "\n".join(lines) + "\n"
+
+
+def _sources(tally: _Tally) -> Iterable[str]:
+    names = {"mesh": "meshes", "material": "materials", "sky": "skies"}
+    for what, name in names.items():
+        used = tally.counts.get(what, Counter())
+        own = Counter({key: n for key, n in used.items() if not key.startswith("file:")})
+        if own:
+            yield f"- FSID's own {name} (Apache-2.0, made by formula): {_listed(own, 'uses')}."
+        for folder, n in sorted(Counter(_folder(key) for key in (used - own).elements()).items()):
+            yield f"- {name} from `{folder}`: {n} uses. {_licence(Path(folder))}"
+    pictures = tally.counts.get("picture", Counter())
+    if pictures:
+        yield f"- {len(pictures)} pictures that the maker of this dataset supplied, under their own licences."
+
+
+def _folder(source: str) -> str:
+    """The folder or library of a "file:PATH" or "file:PATH!MEMBER"."""
+    path, _, member = source.removeprefix("file:").partition("!")
+    return path if member else str(Path(path).parent)
+
+
+def _licence(folder: Path) -> str:
+    """What the folder says of its licence: the first line of a licence file in it or above it."""
+    for place in (folder, folder.parent):
+        if place.is_dir():
+            for file in sorted(place.iterdir()):
+                if file.is_file() and file.stem.lower() in ("license", "licence", "copying"):
+                    first = file.read_text(encoding="utf-8", errors="replace").strip().partition("\n")[0]
+                    return f"`{file.name}`: {first[:200]}"
+    return "No licence file was found with them: look at their source before you publish."
+
+
+def _listed(counts: Counter[str], unit: str) -> str:
+    most = counts.most_common(_FAMILIES_SHOWN)
+    rest = len(counts) - len(most)
+    text = ", ".join(f"{name} ({n})" for name, n in sorted(most, key=lambda item: (-item[1], item[0])))
+    return f"{text or 'none'}{f' and {rest} more' if rest else ''}" + (f" {unit}" if counts else "")
+
+
+def _sheet(shards: Sequence[Path]) -> bytes:
+    """Previews of samples spread over the dataset, as PNG."""
+    tiles = []
+    step = math.ceil(len(shards) / _TILES)
+    for shard in shards[::step]:
+        keys = shard_keys(shard)
+        for key in keys[:: max(1, len(keys) * len(shards[::step]) // _TILES)]:
+            image = Image.open(io.BytesIO(read_member(shard, f"{key}.rgb.png")))
+            image.thumbnail((_TILE_PX, _TILE_PX))
+            tiles.append(np.asarray(image))
+    file = io.BytesIO()
+    smallest = np.min([tile.shape[:2] for tile in tiles], axis=0)
+    sheet = grid([tile[: smallest[0], : smallest[1]] for tile in tiles[:_TILES]])
+    Image.fromarray(sheet).save(file, format="PNG")
+    return file.getvalue()

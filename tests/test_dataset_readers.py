@@ -1,0 +1,88 @@
+"""A finished dataset: its card, and the libraries that others read it with."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import pytest
+import rawpy
+from PIL import Image
+
+from fsid.config import load_settings
+from fsid.dataset import GenerateConfig, generate, shard_path
+
+SETTINGS = ["width=64", "height=48", "texture_size=64", "supersampling=1", "scene.objects=[1,3]"]
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Six pairs of three scenes with different backgrounds and lenses, in two shards."""
+    folder = tmp_path_factory.mktemp("readers") / "data"
+    varied = ["scene.background.kind_shares=[0.4,0.2,0.2,0.2]", "scene.lens.distortion_share=0.5"]
+    families = "scene.material_families=[brick,paint,carpet]"
+    config = load_settings(
+        GenerateConfig, None, [*SETTINGS, *varied, families, "noise_levels=2", "validation_every=3"]
+    )
+    generate(folder, config, count=6, seed=2, shard_size=4, command="fsid generate data --count 6")
+    return folder
+
+
+def test_plain_webdataset_reads_it(data: Path) -> None:
+    webdataset = pytest.importorskip("webdataset")
+    shards = [str(shard_path(data, number)) for number in range(2)]
+    samples = list(webdataset.WebDataset(shards, shardshuffle=False))
+    assert [sample["__key__"] for sample in samples] == [f"{i:08d}" for i in range(6)]
+    with rawpy.imread(io.BytesIO(samples[5]["noisy.dng"])) as raw:
+        assert raw.raw_image.shape == (48, 64)
+
+
+@pytest.mark.parametrize("streaming", [False, True])
+def test_hugging_face_datasets_reads_it(data: Path, streaming: bool, tmp_path: Path) -> None:
+    datasets = pytest.importorskip("datasets")
+    datasets.disable_progress_bars()
+    rows = datasets.load_dataset(
+        "webdataset",
+        data_files={"train": str(data / "shard-*.tar")},
+        split="train",
+        streaming=streaming,
+        cache_dir=str(tmp_path),
+    )
+    samples = list(rows)
+    assert [sample["__key__"] for sample in samples] == [f"{i:08d}" for i in range(6)]
+    assert isinstance(samples[0]["rgb.png"], Image.Image)
+    assert {sample["json"]["split"] for sample in samples} == {"train", "validation"}
+    clean = samples[0]["clean.dng"]
+    with rawpy.imread(io.BytesIO(clean)) as raw:
+        assert raw.raw_image.shape == (48, 64)
+
+
+def test_the_card_says_what_is_there(data: Path) -> None:
+    card = (data / "README.md").read_text()
+    for line in (
+        "6 pairs for denoise, 64 x 48 pixels at most, from 3 rendered scenes",
+        "| train | 4 pairs |",
+        "| validation | 2 pairs |",
+        "fsid generate data --count 6",
+        "FSID's own meshes (Apache-2.0",
+    ):
+        assert line in card
+    with Image.open(data / "samples.png") as sheet:
+        assert sheet.width > 64
+
+
+def test_a_card_is_written_when_all_is_there_and_only_then(data: Path) -> None:
+    before = {name: (data / name).read_bytes() for name in ("README.md", "samples.png")}
+    shard = shard_path(data, 1)
+    stored = shard.read_bytes()
+    shard.unlink()
+    config = load_settings(GenerateConfig, None, ())
+    with pytest.raises(Exception, match="already holds another dataset"):
+        generate(data, config, count=6, seed=2, shard_size=4)
+    from fsid.config import from_plain, read_yaml
+    from fsid.dataset import DatasetConfig
+
+    same = from_plain(DatasetConfig, read_yaml(data / "config.yaml"), source="config.yaml").generate
+    generate(data, same, count=6, seed=2, shard_size=4, command="fsid generate data --count 6")
+    assert shard.read_bytes() == stored
+    assert {name: (data / name).read_bytes() for name in before} == before

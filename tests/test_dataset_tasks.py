@@ -1,0 +1,134 @@
+"""Deblurring pairs and bursts from moving scenes, and linear renders of other engines as a source."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter, map_coordinates
+
+from fsid.config import load_settings
+from fsid.dataset import GenerateConfig, Sample, encode, make_sample
+from fsid.dataset.pictures import read_exr
+from fsid.dataset.tasks import BURST_FRAMES
+from fsid.errors import FsidError
+from fsid.render import Renderer
+from fsid.sensor import Raw, clean_from_linear, exposure_rand, load_profile, pack
+
+SETTINGS = [
+    "width=160",
+    "height=96",
+    "cameras=[pixel6]",
+    "iso_range=[100,100]",
+    "texture_size=64",
+    "supersampling=1",
+    "scene.objects=[3,3]",
+    "scene.material_families=[brick,wood_planks]",
+    "scene.materials.plain_share=0",
+]
+
+
+def config(*settings: str) -> GenerateConfig:
+    return load_settings(GenerateConfig, None, [*SETTINGS, *settings])
+
+
+@pytest.fixture(scope="module")
+def renderer():
+    with Renderer(supersampling=1, texture_size=64) as renderer:
+        yield renderer
+
+
+def sharpness(sample: Sample, name: str) -> float:
+    raw = sample.clean if name == "clean" else sample.more[name]
+    green = pack(raw.mosaic, raw.cfa)[1]
+    return float(np.mean(np.diff(green, axis=0) ** 2) + np.mean(np.diff(green, axis=1) ** 2))
+
+
+def test_a_blurred_image_has_the_light_of_the_sharp_one_and_less_detail(renderer: Renderer) -> None:
+    motion = ["scene.motion.exposure_s=[0.2,0.2]", "scene.motion.shake_deg=[1,1]"]
+    sample = make_sample(config("task=deblur", *motion), 3, 0, renderer)
+    blurred = sample.more["degraded"]
+    assert blurred.mosaic.shape == sample.clean.mosaic.shape
+    assert blurred.mosaic.mean() == pytest.approx(sample.clean.mosaic.mean(), rel=0.05)
+    assert sharpness(sample, "degraded") < 0.8 * sharpness(sample, "clean")
+    assert sample.record["scene"]["cameras"][0]["exposure_s"] == pytest.approx(0.2)
+    assert np.std(sample.noisy.mosaic - blurred.mosaic) < 0.02
+    assert {"clean.dng", "noisy.dng", "degraded.dng", "rgb.png", "json"} == encode(sample).keys()
+
+
+def test_the_flow_of_a_burst_leads_each_frame_to_the_first(renderer: Renderer) -> None:
+    shake = ["scene.motion.shake_deg=[0.8,0.8]", "scene.motion.shake_m=[0.003,0.003]"]
+    sample = make_sample(config("task=burst", *shake), 4, 0, renderer)
+    files = encode(sample)
+    assert len([name for name in files if name.startswith("noisy")]) == BURST_FRAMES
+    first, y, x = green(sample.noisy), *np.mgrid[:48, :80].astype(float)
+    for number in range(1, BURST_FRAMES):
+        flow = np.load(io.BytesIO(files[f"flow{number}.npy"])).astype(float)
+        assert flow.shape == (96, 160, 2)
+        right, down = (flow[::2, ::2, axis] / 2 for axis in range(2))
+        there = map_coordinates(first, [y + down, x + right], order=1, mode="nearest")
+        frame, inside = green(sample.more[f"noisy{number}"]), (slice(8, -8), slice(8, -8))
+        followed, ignored = (np.mean((frame - other)[inside] ** 2) for other in (there, first))
+        assert followed < 0.7 * ignored
+
+
+def green(raw: Raw) -> np.ndarray:
+    """Half-size green without most of the noise."""
+    return gaussian_filter(pack(raw.mosaic, raw.cfa)[1], 1.5)
+
+
+def test_things_that_move_need_scenes(photos: Path) -> None:
+    for task in ("deblur", "burst"):
+        with pytest.raises(FsidError, match=f"--task {task}: needs scenes"):
+            make_sample(config(f"task={task}", f"images={photos}"), 0, 0, None)
+    with pytest.raises(FsidError, match="knows no flow"):
+        config("task=burst", "renderer=reference")
+
+
+def write_exr(path: Path, pixels: np.ndarray, **header: object) -> None:
+    openexr = pytest.importorskip("OpenEXR")
+    channels = {name: np.ascontiguousarray(pixels[..., i]) for i, name in enumerate("RGB")}
+    plain = {"compression": openexr.ZIP_COMPRESSION, "type": openexr.scanlineimage}
+    with openexr.File({**plain, **header}, channels) as file:
+        file.write(str(path))
+
+
+@pytest.mark.parametrize("dtype", [np.float16, np.float32])
+def test_a_linear_render_takes_the_exact_linear_path(
+    dtype: type, tmp_path: Path, rng: np.random.Generator
+) -> None:
+    """Light far above 1, as renders have it: one factor, then the camera; no curve is inverted."""
+    light = rng.lognormal(0, 1.5, (64, 96, 3)).astype(dtype)
+    write_exr(tmp_path / "a.exr", light)
+    np.testing.assert_array_equal(read_exr(tmp_path / "a.exr"), light.astype(np.float32))
+    settings = replace(config(f"images={tmp_path}"), width=96, height=64)
+    sample = make_sample(settings, 0, 0, None)
+    assert sample.record["image"] == "a.exr"
+    stream = np.random.SeedSequence(0, spawn_key=(0, 0, 2, 0))
+    exposure = np.random.default_rng(stream)
+    exposure.integers(1)  # the camera
+    gain = exposure_rand(exposure, light.astype(np.float32))
+    colour = np.random.default_rng(np.random.SeedSequence(0, spawn_key=(0, 0, 3, 0)))
+    expected = clean_from_linear(colour, light.astype(np.float32) * np.float32(gain), load_profile("pixel6"))
+    np.testing.assert_array_equal(sample.clean.mosaic, expected.mosaic)
+
+
+def test_bad_renders_are_named(tmp_path: Path) -> None:
+    light = np.ones((64, 64, 3), np.float32)
+    rec2020 = (0.708, 0.292, 0.17, 0.797, 0.131, 0.046, 0.3127, 0.329)
+    write_exr(tmp_path / "wide.exr", light, chromaticities=rec2020)
+    with pytest.raises(FsidError, match=r"wide\.exr: its primaries"):
+        read_exr(tmp_path / "wide.exr")
+    light[3, 4] = np.nan
+    write_exr(tmp_path / "nan.exr", light)
+    with pytest.raises(FsidError, match=r"nan\.exr: holds NaN"):
+        read_exr(tmp_path / "nan.exr")
+    (tmp_path / "broken.exr").write_bytes((tmp_path / "nan.exr").read_bytes()[:200])
+    with pytest.raises(FsidError, match=r"broken\.exr: cannot be read"):
+        read_exr(tmp_path / "broken.exr")
+    write_exr(tmp_path / "small.exr", np.ones((8, 64, 3), np.float32))
+    with pytest.raises(FsidError, match=r"small\.exr: is 64x8"):
+        read_exr(tmp_path / "small.exr")
