@@ -33,14 +33,15 @@ def main() -> None:
     parser.add_argument("--samples", type=int, default=64, help="paths per pixel of Mitsuba")
     parser.add_argument("--seeds", type=int, nargs="+", default=[3], help="scenes")
     parser.add_argument("--objects", type=int, default=40, help="per scene")
+    parser.add_argument("--texture-size", type=int, default=512, help="texels per side of a material")
     parser.add_argument("--repeat", type=int, default=2, help="draws of each, the fastest counts")
     parser.add_argument("--blender", type=Path, help="Python with bpy: Cycles with 32 samples and denoiser")
     parser.add_argument("--figure", type=Path, help="picture of both renderers side by side to write")
     options = parser.parse_args()
-    path_tracer = ReferenceRenderer(samples=options.samples)
+    path_tracer = ReferenceRenderer(samples=options.samples, texture_size=options.texture_size)
     print(f"Mitsuba {path_tracer.variant}, {options.samples} samples, {options.width} px wide")
     panels = []
-    with Renderer() as raster:
+    with Renderer(texture_size=options.texture_size) as raster:
         for seed in options.seeds:
             config = SceneConfig(objects=(options.objects, options.objects))
             scene = sample(config, seed, width=options.width, height=options.width * 9 // 32 * 2)
@@ -130,7 +131,7 @@ def cycles(python: Path, scene: Scene) -> float:
 
     with tempfile.TemporaryDirectory() as folder:
         glb = Path(folder) / "scene.glb"
-        write_glb(glb, scene, texture_size=256)
+        write_glb(glb, scene, texture_size=512)
         size = [str(scene.cameras[0].width), str(scene.cameras[0].height)]
         command = [str(python), "-c", _CYCLES, str(glb), *size]
         out = subprocess.run(command, capture_output=True, text=True, check=True).stdout

@@ -25,6 +25,8 @@ GUIDES = (
     "inspect.md",
     "capture-a-test-set.md",
     "experiments.md",
+    "bring-your-own-meshes.md",
+    "other-engines.md",
 )
 
 
@@ -40,6 +42,8 @@ def desk(tmp_path_factory: pytest.TempPathFactory, photos: Path) -> Path:
     shutil.copytree(photos, folder / "photographs")
     write_bursts(folder)
     write_captures(folder / "captures")
+    write_mesh(folder / "meshes")
+    write_render(folder / "renders")
     return folder
 
 
@@ -66,6 +70,26 @@ def write_captures(folder: Path) -> None:
         for number in range(6):
             noisy = noisy_from_clean(rng, clean, iso, profile.level(iso))
             write_dng(folder / "star" / level / f"{number:04d}.dng", noisy)
+
+
+def write_mesh(folder: Path) -> None:
+    """A wedge."""
+    folder.mkdir()
+    points = ("0 0 0", "1 0 0", "0 1 0", "0 0 1")
+    faces = ("1 3 2", "1 2 4", "2 3 4", "1 4 3")
+    text = "".join([*(f"v {p}\n" for p in points), *(f"f {f}\n" for f in faces)])
+    (folder / "wedge.obj").write_text(text)
+
+
+def write_render(folder: Path) -> None:
+    """A linear picture as another engine would store it."""
+    import OpenEXR
+
+    folder.mkdir()
+    pixels = np.random.default_rng(2).gamma(2.0, 0.5, (96, 128, 3)).astype(np.float32)
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    with OpenEXR.File(header, {"RGB": pixels}) as file:
+        file.write(str(folder / "scene.exr"))
 
 
 def take_inputs_of_denoise(desk: Path) -> None:
