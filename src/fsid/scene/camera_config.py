@@ -1,4 +1,4 @@
-"""How a scene is seen: view, rig, movement and lens. The defaults are one sharp, still pinhole camera."""
+"""How a scene is seen: view, rig, movement and lens. The defaults are one still camera with a good lens, nearly always sharp."""
 
 # ruff: noqa: RUF009  (a knob is a dataclass field)
 from __future__ import annotations
@@ -75,17 +75,17 @@ class LensConfig:
     """Displacement at the corner of the image relative to its radius: below 0 barrel, above pincushion."""
     fisheye_share: float = knob(0.0, 0.0, 1.0)
     """Share with a fisheye lens instead."""
-    blur_share: float = knob(0.0, 0.0, 1.0)
-    """Share with depth of field: the rest is sharp everywhere."""
-    aperture_m: Range = knob((0.001, 0.008), 1e-5, 0.5)
+    blur_share: float = knob(0.03, 0.0, 1.0)
+    """Share with depth of field; the rest is sharp everywhere. It costs many renders of a scene."""
+    aperture_m: Range = knob((0.0005, 0.004), 1e-5, 0.5)
     """Diameter of the lens opening, for depth of field; log-uniform."""
     focus: Range = knob((0.8, 1.3), 0.1, 10.0)
     """Depth of the sharp plane relative to the distance of the focus."""
-    vignetting_share: float = knob(0.0, 0.0, 1.0)
+    vignetting_share: float = knob(0.3, 0.0, 1.0)
     """Share whose corners are darker."""
     vignetting: Range = knob((0.02, 0.4), 0.0, 0.95)
     """Light lost in the corner of the image."""
-    fringe_share: float = knob(0.0, 0.0, 1.0)
+    fringe_share: float = knob(0.2, 0.0, 1.0)
     """Share with lateral chromatic aberration."""
     fringe: Range = knob((-0.0008, 0.0008), -0.02, 0.02)
     """Magnification of red and of blue relative to green, minus 1."""

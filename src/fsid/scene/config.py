@@ -63,11 +63,11 @@ class MaterialConfig:
     """Share of materials in the colours that their family has in nature, where it has some."""
     layer_share: float = knob(0.03, 0.0, 1.0)
     """Share of materials under dust, dirt, scratches or another layer of wear."""
-    lobe_share: float = knob(0.0, 0.0, 1.0)
+    lobe_share: float = knob(0.7, 0.0, 1.0)
     """Share of parts with the extra lobe that their kind suggests (glass transmits, cloth has sheen ...)."""
-    coat_share: float = knob(0.0, 0.0, 1.0)
+    coat_share: float = knob(0.1, 0.0, 1.0)
     """Share of other parts with a clear coat."""
-    emission_share: float = knob(0.0, 0.0, 1.0)
+    emission_share: float = knob(0.3, 0.0, 1.0)
     """Share of screens, bulbs and lamp shades that are switched on."""
 
     def __post_init__(self) -> None:
@@ -78,7 +78,7 @@ class MaterialConfig:
 class BackgroundConfig:
     """B: what surrounds the objects."""
 
-    kind_shares: tuple[float, float, float, float] = shares(1.0, 0.0, 0.0, 0.0)
+    kind_shares: tuple[float, float, float, float] = shares(0.5, 0.1, 0.15, 0.25)
     """Shares of room, backdrop, tabletop, open-air."""
     width_m: Range = knob((3.0, 6.0), 2.0, 100.0)
     """Width of a closed room along x and along y."""
@@ -107,7 +107,7 @@ class LightConfig:
 
     count: tuple[int, int] = knob((1, 4), 1, 16)
     """Number of lamps, both ends included."""
-    kind_shares: tuple[float, float, float] = shares(0.6, 0.4, 0.0)
+    kind_shares: tuple[float, float, float] = shares(0.45, 0.3, 0.25)
     """Shares of point, spot and area lights among lamps."""
     irradiance: Range = knob((1.0, 10.0), 1e-6, 1e6)
     """Irradiance of all lights together at the focus, radiance units x sr; log-uniform."""
@@ -129,7 +129,7 @@ class LightConfig:
     """Share of open-air scenes with sunlight; the others have an overcast sky or, by `night_share`, lamps."""
     night_share: float = knob(0.1, 0.0, 1.0)
     """Share of open-air scenes that are lit by lamps under a dark sky."""
-    sun_to_sky: Range = knob((1.0, 8.0), 0.01, 100.0)
+    sun_to_sky: Range = knob((0.7, 5.0), 0.01, 100.0)
     """Irradiance of the sun relative to that of the sky; log-uniform."""
 
     def __post_init__(self) -> None:

@@ -35,7 +35,7 @@ LOBES: dict[str, dict[str, Range]] = {
 }
 """Kind -> lobe of `Material` -> range of its weight, uniform."""
 
-EMISSION: dict[str, Range] = {"screen": (0.5, 6.0), "shade": (0.5, 6.0), "bulb": (5.0, 60.0)}
+EMISSION: dict[str, Range] = {"screen": (0.3, 3.0), "shade": (0.3, 3.0), "bulb": (2.0, 20.0)}
 """Kind -> range of `Material.emission`, log-uniform; lamps give an irradiance of 1 to 10 by default."""
 
 _CLEAR = ("glass", "liquid")
