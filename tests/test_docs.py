@@ -19,6 +19,7 @@ REPOSITORY = Path(__file__).resolve().parents[1]
 GUIDES = (
     "noise-profiles.md",
     "generate.md",
+    "scenes.md",
     "calibrate.md",
     "train-and-denoise.md",
     "evaluate.md",
