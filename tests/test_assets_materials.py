@@ -1,5 +1,8 @@
 """Laws of material maps: range, tiling, determinism, and detail down to the texel."""
 
+import runpy
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -15,6 +18,7 @@ from fsid.assets.material_registry import draw_material
 from fsid.assets.patterns import cells, level, noise, shade, stack, warp
 from fsid.errors import FsidError
 
+REPOSITORY = Path(__file__).resolve().parents[1]
 MAPS = ("mix", "pattern", "detail", "roughness", "height", "metallic")
 SIZE = 128
 
@@ -23,6 +27,12 @@ SIZE = 128
 def baked():
     names = material_families()
     return {(name, v): bake_material(name, v, SIZE) for name in names for v in range(MATERIAL_VARIANTS)}
+
+
+def test_the_guide_lists_what_the_registry_has():
+    """docs/materials.md is written by tools/materials.py; run it after a change of families or layers."""
+    tool = runpy.run_path(str(REPOSITORY / "tools" / "materials.py"))
+    assert (REPOSITORY / "docs" / "materials.md").read_text(encoding="utf-8") == tool["guide"]()
 
 
 def test_there_are_sixty_four_families():

@@ -126,6 +126,13 @@ def material_families() -> tuple[str, ...]:
     return tuple(sorted(_MATERIALS))
 
 
+def material_summary(name: str) -> str:
+    """What a family or a layer is: the first line of its docstring, without the full stop."""
+    _discover()
+    function = _OVERLAYS[name] if name in _OVERLAYS else _material(name).draw
+    return (function.__doc__ or "").strip().splitlines()[0].rstrip(".")
+
+
 def material_layers() -> tuple[str, ...]:
     """Names of all layers, sorted: "FAMILY+LAYER" is the family under that layer."""
     _discover()
