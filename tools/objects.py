@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import colorsys
 import sys
+import zlib
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -64,7 +65,8 @@ def picture(renderer: Renderer, family: str, seed: int, size: int) -> np.ndarray
     mesh = build_mesh(family, seed)
     extent = mesh.vertices.max(0) - mesh.vertices.min(0)
     scale = 1.0 / float(np.linalg.norm(extent))
-    hues = (0.61803 * np.arange(len(mesh.part_names)) + 0.1 * seed) % 1
+    first = zlib.crc32(family.encode()) % 100 / 100 + 0.1 * seed
+    hues = (0.61803 * np.arange(len(mesh.part_names)) + first) % 1
     materials = tuple(
         _paint(colorsys.hsv_to_rgb(hue, 0.5, 0.65), part_kind(name) == "leaf")
         for hue, name in zip(hues, mesh.part_names, strict=True)

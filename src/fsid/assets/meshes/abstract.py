@@ -161,7 +161,7 @@ def lattice(rng: np.random.Generator) -> Parts:
     if rng.random() < 0.6:
         struts.append(np.stack([grid[:-1, :-1, :-1].reshape(-1, 3), grid[1:, 1:, 1:].reshape(-1, 3)], axis=1))
     ends = np.concatenate(struts)
-    bars = tubes(ends[:, :1] + np.linspace(0, 1, 3)[None, :, None] * (ends[:, 1:] - ends[:, :1]), thick, 7)
+    bars = tubes(ends[:, :1] + np.linspace(0, 1, 3)[None, :, None] * (ends[:, 1:] - ends[:, :1]), thick, 6)
     nodes = grid.reshape(-1, 3)
     knob = (
         ball(thick * rng.uniform(1.3, 2.6), 1)

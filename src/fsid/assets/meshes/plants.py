@@ -9,7 +9,6 @@ from fsid.assets.registry import Parts, mesh_family
 from fsid.assets.solids import (
     Solid,
     ball,
-    cone,
     copies,
     cylinder,
     join,
@@ -209,7 +208,7 @@ def leaf_rand(rng: np.random.Generator, kind: int, length: float) -> Solid:
     if kind == 5:
         return _compound(_grid_leaf(_oval(np.linspace(0, 1, 5)), fold, droop, 3), length, 7)
     if kind == 7:
-        needle = cone(0.008, 0.002, 0.34, 0.001, 4)
+        needle = lathe([(0.008, 0), (0.0015, 0.34)], 4)
         k = np.arange(26)
         way = np.c_[np.full(26, 0.55), np.cos(2.4 * k), np.sin(2.4 * k)]
         needles = copies(needle, turns_to(way), np.c_[k / 26, 0 * k, 0 * k])

@@ -126,7 +126,7 @@ def bowl(rng: np.random.Generator) -> Parts:
 
 @mesh_family("plate")
 def plate_stack(rng: np.random.Generator) -> Parts:
-    """One to eight plates in a stack, coupe or with a rim and a well."""
+    """One to five plates in a stack, coupe or with a rim and a well."""
     radius, rim = rng.uniform(0.07, 0.15), rng.uniform(0.0, 0.45)
     rise, wall = rng.uniform(0.012, 0.035), rng.uniform(0.003, 0.005)
     t = np.linspace(0, 1, 16)
@@ -134,14 +134,14 @@ def plate_stack(rng: np.random.Generator) -> Parts:
     z = rise * np.where(t < (well - flat) / (1 - flat), 0.75, 1.0) * np.clip(t * 1.2, 0, 1) ** 1.3
     z = np.maximum.accumulate(z + 1e-4 * np.arange(16))
     outer = radius * (flat + (1 - flat) * t)
-    one = hollow(outer, z - z[0], wall, segments=56)
-    foot = lathe([(0.44 * radius, -0.004), (0.47 * radius, -0.004), (0.47 * radius, 0.001)], 56, 50)
-    inner = lathe([(0.44 * radius, 0.001), (0.44 * radius, -0.004)], 56, 50)
+    one = hollow(outer, z - z[0], wall, segments=44)
+    foot = lathe([(0.44 * radius, -0.004), (0.47 * radius, -0.004), (0.47 * radius, 0.001)], 44, 50)
+    inner = lathe([(0.44 * radius, 0.001), (0.44 * radius, -0.004)], 44, 50)
     if rng.random() < 0.25:
         wavy = fluted(int(rng.integers(8, 20)), rng.uniform(0.01, 0.03), 0.0)
         one, foot, inner = one.warped(wavy), foot.warped(wavy), inner.warped(wavy)
     single = join([one, foot, inner])
-    count = 1 if rng.random() < 0.5 else int(rng.integers(2, 7))
+    count = 1 if rng.random() < 0.5 else int(rng.integers(2, 6))
     stack = [
         single.turned(z_deg=rng.uniform(0, 360)).at(rng.normal(0, 0.002) * (k > 0), 0, k * (wall + 0.0055))
         for k in range(count)
