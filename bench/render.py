@@ -1,9 +1,12 @@
-"""Seconds per frame of the renderer and where they go: python bench/render.py [--frames 5]
+"""Seconds per frame, where they go, and what quality costs: python bench/render.py [--frames 5]
 
 Sampled scenes of 40 objects with three lights at 960x540 and 1920x1080, 2 x 2 samples per pixel. Every
 scene is drawn once before it is timed, so baking and compiling are not counted; the fastest of `--repeat`
 draws counts, because other work on the machine only ever adds. "cpu" is processor time of all threads: it
 stays true on a busy machine, and its half is what two free cores would take.
+
+--fidelity compares both qualities with 4 x 4 samples per pixel (PSNR of the radiance, scaled so that its 97th
+percentile is white, at 640x360). --triangles draws one scene with meshes divided into ever more triangles.
 """
 
 from __future__ import annotations
@@ -11,9 +14,14 @@ from __future__ import annotations
 import argparse
 import resource
 import time
+from collections.abc import Sequence
+from dataclasses import replace
 
+import numpy as np
+
+from fsid.assets import Mesh
 from fsid.render import Renderer
-from fsid.render.drawable import view_of
+from fsid.render.drawable import View, view_of
 from fsid.scene import Scene, SceneConfig, sample
 
 SIZES = ((960, 540), (1920, 1080))
@@ -26,36 +34,104 @@ def main() -> None:
     parser.add_argument("--repeat", type=int, default=3, help="draws per scene, the fastest counts")
     parser.add_argument("--texture-size", type=int, default=512, help="texels per side of a material")
     parser.add_argument("--device", type=int, default=None, help="EGL device")
+    parser.add_argument("--quality", default="high", help="high or fast")
+    parser.add_argument("--fidelity", action="store_true", help="compare the qualities instead")
+    parser.add_argument("--triangles", action="store_true", help="cost over triangles instead")
     options = parser.parse_args()
-    config = SceneConfig(objects=(40, 40))
-    totals = []
-    with Renderer(texture_size=options.texture_size, device_index=options.device) as renderer:
-        print(f"{renderer.info.renderer}, OpenGL {renderer.info.version}")
-        print(f"{'size':>10} {'total s':>8} {'cpu s':>8}  " + "  ".join(f"{stage:>11}" for stage in STAGES))
-        for width, height in SIZES:
-            scenes = [sample(config, seed, width=width, height=height) for seed in range(options.frames)]
-            rows = [fastest(renderer, scene, options.repeat) for scene in scenes]
-            mean = {key: sum(row[key] for row in rows) / len(rows) for key in rows[0]}
-            totals.append(mean)
-            split = "  ".join(f"{mean[stage]:11.3f}" for stage in STAGES)
-            print(f"{width:>5}x{height:<4} {mean['total']:8.3f} {mean['cpu']:8.3f}  {split}")
-        faces = sum(face_count(scene) for scene in scenes) / len(scenes)
-    small, large = (t["total"] for t in totals)
-    print(
-        f"1920x1080 costs {large / small:.2f} x 960x540 for 4 x the pixels; {faces:,.0f} triangles per scene"
-    )
+    if options.fidelity:
+        return fidelity(options)
+    with open_renderer(options, options.quality) as renderer:
+        print(f"{renderer.info.renderer}, OpenGL {renderer.info.version}, quality {options.quality}")
+        triangles(renderer, options) if options.triangles else frames(renderer, options)
     print(f"peak memory {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:,.0f} MiB")
+    return None
 
 
-def fastest(renderer: Renderer, scene: Scene, repeat: int) -> dict[str, float]:
+def open_renderer(options: argparse.Namespace, quality: str, supersampling: int = 2) -> Renderer:
+    return Renderer(
+        texture_size=options.texture_size,
+        device_index=options.device,
+        quality=quality,
+        supersampling=supersampling,
+    )
+
+
+def scenes_of(count: int, width: int, height: int) -> list[Scene]:
+    config = SceneConfig(objects=(40, 40))
+    return [sample(config, seed, width=width, height=height) for seed in range(count)]
+
+
+def frames(renderer: Renderer, options: argparse.Namespace) -> None:
+    """Stages and totals at both sizes."""
+    print(f"{'size':>10} {'total s':>8} {'cpu s':>8}  " + "  ".join(f"{stage:>11}" for stage in STAGES))
+    totals = []
+    for width, height in SIZES:
+        views = [view_of(scene, 0) for scene in scenes_of(options.frames, width, height)]
+        rows = [fastest(renderer, view, options.repeat) for view in views]
+        mean = {key: sum(row[key] for row in rows) / len(rows) for key in rows[0]}
+        totals.append(mean)
+        split = "  ".join(f"{mean[stage]:11.3f}" for stage in STAGES)
+        print(f"{width:>5}x{height:<4} {mean['total']:8.3f} {mean['cpu']:8.3f}  {split}")
+    faces = sum(face_count(view) for view in views) / len(views)
+    small, large = (t["cpu"] for t in totals)
+    print(f"1920x1080 costs {large / small:.2f} x 960x540 for 4 x the pixels; {faces:,.0f} triangles a scene")
+
+
+def triangles(renderer: Renderer, options: argparse.Namespace) -> None:
+    """Processor time over the number of triangles of one scene."""
+    view = view_of(scenes_of(1, *SIZES[0])[0], 0)
+    for _ in range(3):
+        row = fastest(renderer, view, options.repeat)
+        print(f"{face_count(view):>12,} triangles {row['cpu']:8.3f} cpu s")
+        view = replace(view, drawables=tuple(replace(d, mesh=divided(d.mesh)) for d in view.drawables))
+
+
+def divided(mesh: Mesh) -> Mesh:
+    """Every triangle as four."""
+    a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
+    na, nb, nc = (mesh.normals[mesh.faces[:, i]] for i in range(3))
+    points = np.concatenate([a, b, c, (a + b) / 2, (b + c) / 2, (c + a) / 2])
+    normals = np.concatenate([na, nb, nc, na + nb, nb + nc, nc + na])
+    normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    count = len(mesh.faces)
+    A, B, C, AB, BC, CA = (np.arange(count) + i * count for i in range(6))
+    faces = np.concatenate([np.stack(t, -1) for t in ((A, AB, CA), (AB, B, BC), (CA, BC, C), (AB, BC, CA))])
+    parts = np.tile(mesh.face_parts, 4)
+    return Mesh(
+        points.astype(np.float32), normals.astype(np.float32), faces.astype(np.int32), parts, mesh.part_names
+    )
+
+
+def fidelity(options: argparse.Namespace) -> None:
+    """PSNR and processor time of both qualities against 4 x 4 samples per pixel."""
+    views = [view_of(scene, 0) for scene in scenes_of(options.frames, 640, 360)]
+    with open_renderer(options, "high", supersampling=4) as renderer:
+        references = [renderer.draw(view).radiance for view in views]
+    for quality in ("high", "fast"):
+        with open_renderer(options, quality) as renderer:
+            rows = [fastest(renderer, view, options.repeat) for view in views]
+            images = [renderer.draw(view).radiance for view in views]
+        psnr = np.mean([_psnr(a, b) for a, b in zip(images, references, strict=True)])
+        cpu = np.mean([row["cpu"] for row in rows])
+        print(f"{quality:>5}: {psnr:.1f} dB against 4 x 4 samples, {cpu:.3f} cpu s at 640x360")
+
+
+def _psnr(image: np.ndarray, reference: np.ndarray) -> float:
+    white = np.quantile(reference, 0.97)
+    error = np.clip(image / white, 0, 1).astype(float) - np.clip(reference / white, 0, 1)
+    return float(-10 * np.log10((error**2).mean()))
+
+
+def fastest(renderer: Renderer, view: View, repeat: int) -> dict[str, float]:
     """Seconds by stage of the fastest draw, its total and its processor time."""
-    draw(renderer, scene)
-    return min((draw(renderer, scene) for _ in range(repeat)), key=lambda row: row["total"])
+    draw(renderer, view)
+    rows: Sequence[dict[str, float]] = [draw(renderer, view) for _ in range(repeat)]
+    return min(rows, key=lambda row: row["cpu"])
 
 
-def draw(renderer: Renderer, scene: Scene) -> dict[str, float]:
+def draw(renderer: Renderer, view: View) -> dict[str, float]:
     """Seconds by stage; every stage waits for the device."""
-    row: dict[str, float] = {}
+    row = dict.fromkeys(STAGES, 0.0)
     cpu = time.process_time()
     start = last = time.perf_counter()
 
@@ -63,16 +139,16 @@ def draw(renderer: Renderer, scene: Scene) -> dict[str, float]:
         nonlocal last
         renderer.wait()
         now = time.perf_counter()
-        row[stage] = now - last
+        row[stage] += now - last
         last = now
 
-    renderer.draw(view_of(scene, 0), mark=mark)
+    renderer.draw(view, mark=mark)
     return row | {"total": time.perf_counter() - start, "cpu": time.process_time() - cpu}
 
 
-def face_count(scene: Scene) -> int:
-    """Triangles of a scene."""
-    return sum(len(drawable.mesh.faces) for drawable in view_of(scene, 0).drawables)
+def face_count(view: View) -> int:
+    """Triangles of a view."""
+    return sum(len(drawable.mesh.faces) for drawable in view.drawables)
 
 
 if __name__ == "__main__":

@@ -8,12 +8,13 @@ import os
 import platform
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 
 from fsid import __version__
 from fsid.errors import FsidError
-from fsid.render import Renderer
+from fsid.render import Renderer, egl_devices
 from fsid.scene import SceneConfig, sample
 
 LIBRARIES = (
@@ -25,7 +26,10 @@ LIBRARIES = (
     "scikit-image",
     "torch",
     "accelerate",
+    "onnxruntime",
     "ray",
+    "mitsuba",
+    "OpenEXR",
 )
 
 
@@ -39,6 +43,16 @@ def examine() -> Iterator[tuple[str, str]]:
     yield "LibRaw", _libraw()
     yield "PyTorch device", _torch_device()
     yield from _render_one()
+
+
+def _why_no_gpu() -> str:
+    """What to do where a GPU is there, but its OpenGL is not."""
+    if not any(Path("/dev").glob("nvidia[0-9]*")):
+        return "No GPU was found."
+    wanted = os.environ.get("NVIDIA_DRIVER_CAPABILITIES", "")
+    if "graphics" not in wanted and "all" not in wanted:
+        return "There is an NVIDIA GPU: set NVIDIA_DRIVER_CAPABILITIES=graphics (or all) for the container."
+    return "There is an NVIDIA GPU: install the driver's libnvidia-gl (libEGL_nvidia.so.0) beside it."
 
 
 def _version(package: str) -> str:
@@ -65,11 +79,15 @@ def _torch_device() -> str:
 
 
 def _render_one() -> Iterator[tuple[str, str]]:
-    with Renderer() as renderer:
+    devices = egl_devices()
+    for index, info in devices.items():
+        where = "CPU" if info.is_software else "GPU"
+        yield f"EGL device {index}", f"{where}: {info.renderer} ({info.vendor}), OpenGL {info.version}"
+    with Renderer(texture_size=256) as renderer:
         info = renderer.info
-        yield "OpenGL", f"{info.version}, {info.renderer} ({info.vendor})"
+        yield "Renders on", f"{info.renderer} ({info.vendor})"
         if info.is_software:
-            yield "", "software rendering on the CPU: correct, slower than a GPU"
+            yield "", f"software rendering on the CPU: correct, slower than a GPU. {_why_no_gpu()}"
         scene = sample(SceneConfig(), 0, width=480, height=270, variant="full")
         renderer.render(scene)
         start = time.perf_counter()

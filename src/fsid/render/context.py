@@ -58,6 +58,19 @@ def open_context(device_index: int | None) -> moderngl.Context:
     return _create(software)
 
 
+def egl_devices() -> dict[int, GlInfo]:
+    """EGL device index -> what it is, of all that give OpenGL 4.3. Not while a Renderer is open."""
+    found: dict[int, GlInfo] = {}
+    for index in range(_MAX_DEVICES):
+        try:
+            context = _create(index)
+        except FsidError:
+            continue
+        found[index] = gl_info(context)
+        context.release()
+    return found
+
+
 def gl_info(context: moderngl.Context) -> GlInfo:
     """Vendor, device and version of the context."""
     info: dict[str, Any] = context.info
