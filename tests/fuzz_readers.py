@@ -19,10 +19,12 @@ import numpy as np
 import tifffile
 from PIL import Image
 
+from embedded_files import CR3, RAF
 from fsid.errors import FsidError
 from fsid.sensor import Raw, load_profile, read_raw, write_dng
 from fsid.sensor.bare import read_dn
 from fsid.sensor.dng import read_header
+from fsid.sensor.embedded import embedded_directories
 
 MEMORY_LIMIT = 3 << 30
 EXTREMES = (0, 1, 0x7FFF, 0xFFFF, 0x7FFFFFFF, 0xFFFFFFFF)
@@ -44,6 +46,8 @@ def seeds(folder: Path) -> list[Path]:
     tifffile.imwrite(folder / "e.tif", dn, compression="zlib", predictor=True)
     np.save(folder / "f.npy", dn)
     dn.tofile(folder / "g.raw")
+    (folder / "h.cr3").write_bytes(CR3)
+    (folder / "i.raf").write_bytes(RAF)
     return sorted(folder.iterdir())
 
 
@@ -78,6 +82,10 @@ def read(path: Path) -> None:
         read_header(path)
         if not np.all(np.isfinite(read_raw(path).mosaic)):
             raise AssertionError("an image that is not finite")
+    elif path.suffix in (".cr3", ".raf"):
+        with path.open("rb") as file:
+            embedded_directories(file)
+        read_header(path)
     else:
         read_dn(path, cfa="RGGB", width=48, height=32)
 

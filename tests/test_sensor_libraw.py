@@ -1,7 +1,5 @@
 """Cameras whose files are not at hand (NEF, CR3, RAF, X3F): a stand-in says what LibRaw would say of them."""
 
-import io
-import struct
 from contextlib import contextmanager
 from datetime import datetime
 from types import SimpleNamespace
@@ -10,11 +8,11 @@ import numpy as np
 import pytest
 import rawpy
 
+from embedded_files import CR3, RAF
 from fsid.errors import FsidError
 from fsid.sensor import develop, read_raw, write_dng
 from fsid.sensor.colour import published_matrices
 from fsid.sensor.dng import read_header
-from fsid.sensor.tiff import ASCII, RATIONAL, SHORT, Directory, Tag, read_directories, tiff_bytes
 
 BAYER = np.array([[0, 1], [3, 2]], np.uint8)
 X_TRANS = np.array([[1, 0, 1, 1, 2, 1], [2, 1, 2, 0, 1, 0], [1, 2, 1, 1, 0, 1]] * 2, np.uint8)
@@ -95,27 +93,6 @@ def test_what_libraw_says_of_an_exposure_reaches_the_rewritten_file(opened, tmp_
     tags = {tag.code: tag.values for tag in back.metadata.exif}
     assert tags[42036] == b"A lens 24-70\0"
     assert (tags[33437], tags[37386]) == ((14, 5), (35, 1))
-
-
-def exif(*tags: Tag) -> bytes:
-    return tiff_bytes(Directory(tags))
-
-
-def box(kind: bytes, content: bytes) -> bytes:
-    return struct.pack(">I4s", len(content) + 8, kind) + content
-
-
-CAMERA = exif(Tag(271, ASCII, b"Canon\0"), Tag(272, ASCII, b"Canon EOS R5\0"), Tag(274, SHORT, (8,)))
-EXPOSURE = exif(Tag(33434, RATIONAL, (1, 125)), Tag(34855, SHORT, (3200,)), Tag(42036, ASCII, b"RF50mm\0"))
-CANON = bytes.fromhex("85c0b687820f11e08111f4ce462b6a48")
-CR3 = (
-    box(b"ftyp", b"crx \0\0\0\1crx isom")
-    + box(b"moov", box(b"uuid", CANON + box(b"CNCV", b"v") + box(b"CMT1", CAMERA) + box(b"CMT2", EXPOSURE)))
-    + box(b"mdat", bytes(64))
-)
-BOTH = exif(*(tag for part in (CAMERA, EXPOSURE) for tag in read_directories(io.BytesIO(part))[0].values()))
-JPEG = b"\xff\xd8\xff\xe1" + struct.pack(">H", len(BOTH) + 8) + b"Exif\0\0" + BOTH
-RAF = b"FUJIFILMCCD-RAW 0201".ljust(84, b"\0") + struct.pack(">II", 160, len(JPEG)) + bytes(68) + JPEG
 
 
 @pytest.mark.parametrize(("name", "data"), [("a.cr3", CR3), ("a.raf", RAF)])
