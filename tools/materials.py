@@ -71,9 +71,9 @@ CACHE = """
 A bake takes tenths of a second, so it is kept in a folder: `$FSID_CACHE`, else `$XDG_CACHE_HOME/fsid`, else
 `~/.cache/fsid`. `FSID_CACHE=off` keeps nothing. The result is the same with and without: maps are rounded
 (8 bit, height 16 bit) before they are returned, not only when they are stored. The name of an entry holds a
-hash of the sources that made it and of the versions of NumPy, SciPy, Pillow and Matplotlib, so an entry cannot
-be stale; the folder stays below 2 GiB, what was used longest ago leaves first; a damaged entry is baked again;
-any number of processes may share it. Deleting it costs time and nothing else.
+hash of the sources that made it and of the versions of NumPy, SciPy, Pillow and Matplotlib, so an entry
+cannot be stale; the folder stays below 2 GiB, what was used longest ago leaves first; a damaged entry is
+baked again; any number of processes may share it. Deleting it costs time and nothing else.
 """
 
 
@@ -125,8 +125,8 @@ def sheet(names: Sequence[tuple[str, int]], columns: int) -> Image.Image:
         materials=tuple((material(name, variant, rng),) * 2 for name, variant in names),
         transforms=tuple(Transform(place, (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)) for place in places),
         background=Background("room", (14.0, 14.0, 14.0), dict.fromkeys(surfaces, grey)),
-        lights=(Light("sun", (0.0, 0.0, 0.0), (0.5, -0.6, -0.8), (2.2, 2.1, 2.0), 0.05, 360.0),),
-        ambient=(0.45, 0.47, 0.5),
+        lights=(Light("point", (-4.5, 4.0, 4.5), (0.0, 0.0, -1.0), (170.0, 165.0, 155.0), 0.3, 360.0),),
+        ambient=(0.3, 0.32, 0.35),
         cameras=(
             Camera(
                 (0.0, -0.01, distance),
