@@ -57,7 +57,7 @@ def noisy_raw(iso: float = 3200) -> Raw:
         PROFILE.black_level,
         PROFILE.white_level,
         (2.0, 1.0, 1.5),
-        PROFILE.xyz_to_camera,
+        PROFILE.xyz_to_camera[0],
         camera="Galaxy",
         metadata=exposure_metadata(exposure_s=1 / 30, f_number=1.8, lens="wide"),
     )

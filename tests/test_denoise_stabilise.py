@@ -1,4 +1,4 @@
-"""In the stabilised domain every camera's noise is N(0, 1), and nothing is lost on the way."""
+"""What the network is told: in each of its domains the noise has the law that it should have."""
 
 from __future__ import annotations
 
@@ -7,9 +7,15 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from hypothesis import given  # noqa: E402
+from hypothesis import given, settings  # noqa: E402
 from hypothesis import strategies as st  # noqa: E402
 
+from fsid.denoise.conditioning import (  # noqa: E402
+    ANCHOR_K,
+    ANCHOR_SIGMA2,
+    clean_estimate,
+    network_input,
+)
 from fsid.denoise.stabilise import stabilise, unstabilise  # noqa: E402
 from fsid.sensor import load_profile  # noqa: E402
 
@@ -20,6 +26,7 @@ def full(value: float) -> torch.Tensor:
     return torch.full((1, 4, 1, 1), value, dtype=torch.double)
 
 
+@settings(deadline=None)
 @given(k=gains, sigma2=st.floats(0, 1e-2), x=st.lists(st.floats(-0.3, 1.5), min_size=1, max_size=8))
 def test_round_trip_and_order(k: float, sigma2: float, x: list[float]) -> None:
     image = torch.tensor(sorted(x), dtype=torch.double).expand(1, 4, 1, len(x))
@@ -28,6 +35,7 @@ def test_round_trip_and_order(k: float, sigma2: float, x: list[float]) -> None:
     assert (y.diff(dim=-1) >= 0).all()
 
 
+@settings(deadline=None)
 @given(sigma2=st.floats(1e-6, 1e-2), x=st.floats(-0.3, 1.5))
 def test_without_shot_noise_it_is_a_division_by_sigma(sigma2: float, x: float) -> None:
     y = stabilise(full(x), full(0.0), full(sigma2))
@@ -43,3 +51,28 @@ def test_unit_variance_at_every_brightness(camera: str, iso: float, rng: np.rand
         noise = torch.from_numpy(rng.standard_normal((1, 4, 100, 100)))
         y = stabilise(x + torch.sqrt(k * x + sigma2) * noise, k, sigma2)
         torch.testing.assert_close(y.var((0, 2, 3)), torch.ones(4, dtype=torch.double), atol=0.08, rtol=0)
+
+
+@pytest.mark.parametrize("kind", ["stabilise", "k-sigma", "noise-map"])
+def test_no_residual_is_the_identity_and_gradients_reach_it(kind: str) -> None:
+    noisy = torch.rand(2, 4, 6, 6, dtype=torch.double) - 0.1
+    k, sigma2 = (torch.full((2, 4, 1, 1), value, dtype=torch.double) for value in (2e-3, 1e-5))
+    residual = torch.zeros_like(noisy, requires_grad=True)
+    clean = clean_estimate(noisy, residual, k, sigma2, kind)
+    torch.testing.assert_close(clean.detach(), noisy, atol=1e-9, rtol=1e-9)
+    clean.sum().backward()
+    assert (residual.grad > 0).all()
+
+
+def test_after_k_sigma_the_noise_depends_on_the_signal_alone(rng: np.random.Generator) -> None:
+    """Two ISOs, signals that transform to one value: noise of one variance, that of the anchor there."""
+    for value in (0.1, 0.4, 1.5):
+        for k, sigma2 in ((5e-4, 1e-6), (8e-3, 4e-4)):
+            clean = k * (value / ANCHOR_K + ANCHOR_SIGMA2 / ANCHOR_K**2 - sigma2 / k**2)
+            noise = np.sqrt(k * clean + sigma2) * rng.standard_normal((1, 4, 200, 200))
+            x = clean + torch.from_numpy(noise)
+            image, planes = network_input(x, full(k), full(sigma2), "k-sigma")
+            anchored = (image + 0.5) / 2
+            assert anchored.mean().item() == pytest.approx(value, rel=0.01)
+            assert anchored.var().item() == pytest.approx(ANCHOR_K * value + ANCHOR_SIGMA2, rel=0.03)
+            assert (planes == 0).all()

@@ -50,11 +50,12 @@ def load_onnx(file: Path) -> OnnxDenoiser:
         raise FsidError(f"{file}: cannot be read ({error.strerror})") from None
 
 
-def onnx_denoiser(graph: bytes, source: str) -> OnnxDenoiser:
-    """The network of a serialised graph; `source` names it in errors."""
+def onnx_denoiser(graph: bytes, source: str, *, threads: int = 0) -> OnnxDenoiser:
+    """The network of a serialised graph; `source` names it in errors. threads: 0 for all cores."""
     import onnxruntime
 
     options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = threads
     options.log_severity_level = 3  # it warns that inputs with defaults are not constants
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
     try:
