@@ -1,0 +1,211 @@
+"""What a dataset costs beside rendering: python bench/dataset.py [--pairs 6] [--scenes 60] [--width 1920]
+
+All ratios are of one run. "cpu" is processor time of all threads of the process, which stays true on a busy
+machine. Sections: cost of a pair by stage; two workers against one; memory per scene; time over pixels and
+over triangles; patches of the loader. The memory of 1,000 scenes: --scenes 1000 --only memory.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from fsid.dataset import GenerateConfig, encode, generate
+from fsid.dataset.attempt import Attempt
+from fsid.dataset.shards import write_shard
+from fsid.render import Frame, Renderer
+from fsid.scene import Scene
+from fsid.scene.config import SceneConfig
+
+SECTIONS = ("stages", "workers", "memory", "growth", "loader")
+
+
+class Timed:
+    """A renderer that adds up the time it takes; sampling of the scene is not in it."""
+
+    def __init__(self, renderer: Renderer) -> None:
+        self._renderer, self.wall_s, self.cpu_s = renderer, 0.0, 0.0
+
+    def render(self, scene: Scene, camera_index: int = 0) -> Frame:
+        wall, cpu = time.perf_counter(), time.process_time()
+        frame = self._renderer.render(scene, camera_index)
+        self.wall_s += time.perf_counter() - wall
+        self.cpu_s += time.process_time() - cpu
+        return frame
+
+
+def stages(config: GenerateConfig, pairs: int) -> None:
+    """Share of everything that is not rendering, scene sampling among it, in the time of a pair."""
+    with Renderer(supersampling=config.supersampling, texture_size=config.texture_px) as renderer:
+        make(config, 0, renderer)
+        timed, wall, cpu = Timed(renderer), time.perf_counter(), time.process_time()
+        with tempfile.TemporaryDirectory() as folder:
+            samples = (encoded for i in range(1, pairs + 1) for encoded in make(config, i, timed))
+            write_shard(Path(folder) / "shard.tar", samples)
+        wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
+    print(
+        f"pair of {config.width}x{config.height}: {wall / pairs:.2f} s, of it rendering "
+        f"{timed.wall_s / pairs:.2f} s; "
+        f"not rendering {100 * (1 - timed.wall_s / wall):.1f} % of the time, "
+        f"{100 * (1 - timed.cpu_s / cpu):.1f} % of cpu"
+    )
+
+
+def make(
+    config: GenerateConfig, frame: int, renderer: Renderer | Timed
+) -> list[tuple[str, dict[str, bytes]]]:
+    """The encoded samples of a frame, whatever the checks say."""
+    free = replace(config, checks=replace(config.checks, black_share=1.0, blown_share=1.0))
+    samples = Attempt(free, 0, frame).samples(renderer)
+    assert isinstance(samples, list), samples
+    return [(sample.key, encode(sample)) for sample in samples]
+
+
+def workers(config: GenerateConfig, pairs: int) -> None:
+    """Two workers against one, without starting them: what the second half of the shards took."""
+    rates = {}
+    for count in (1, 2, 1, 2):
+        with tempfile.TemporaryDirectory() as folder:
+            times: list[tuple[float, int]] = []
+            generate(
+                Path(folder) / "data",
+                config,
+                count=4 * pairs,
+                workers=count,
+                shard_size=1,
+                progress=lambda done, total, times=times: times.append((time.perf_counter(), done)),
+            )
+        (start, before), (end, after) = times[1 + pairs], times[-1 if times[-1][1] > times[-2][1] else -2]
+        rates[count] = max(rates.get(count, 0.0), (after - before) / (end - start))
+    ratio = rates[2] / rates[1]
+    print(f"workers: 1 makes {rates[1]:.2f} pairs/s, 2 make {rates[2]:.2f}: {ratio:.2f} times as many")
+
+
+def memory(config: GenerateConfig, scenes: int) -> None:
+    """Resident memory of one worker over scenes: a line through the second half."""
+    resident = []
+    with Renderer(supersampling=config.supersampling, texture_size=config.texture_px) as renderer:
+        for i in range(scenes):
+            make(config, i, renderer)
+            pages = int(Path("/proc/self/statm").read_text().split()[1])
+            resident.append(pages * os.sysconf("SC_PAGE_SIZE") / 2**20)
+    half = resident[scenes // 2 :]
+    slope = np.polyfit(np.arange(len(half)), half, 1)[0]
+    print(
+        f"memory: {half[0]:.0f} to {half[-1]:.0f} MiB over the last {len(half)} of {scenes} scenes, ", end=""
+    )
+    print(f"{slope:+.3f} MiB per scene")
+
+
+def growth(config: GenerateConfig) -> None:
+    """Rendering time over pixels, and over triangles at one size."""
+    with Renderer(supersampling=config.supersampling, texture_size=config.texture_px) as renderer:
+        for width, height in ((480, 270), (960, 540), (1920, 1080)):
+            sized = replace(config, width=width, height=height, texture_size=config.texture_px)
+            print(f"{width}x{height}: {render_seconds(sized, renderer):.2f} s per frame")
+        for objects in (10, 40, 160):
+            scene = replace(config.scene, objects=(objects, objects))
+            sized = replace(config, width=960, height=540, texture_size=config.texture_px, scene=scene)
+            print(f"{objects} objects at 960x540: {render_seconds(sized, renderer):.2f} s per frame")
+
+
+def render_seconds(config: GenerateConfig, renderer: Renderer, scenes: int = 2) -> float:
+    """Mean over scenes of the faster of two renders each, after one that loads what it needs."""
+    total = 0.0
+    for i in range(scenes):
+        scene = Attempt(config, 0, i).drawn_scene()
+        renderer.render(scene)
+        total += min(seconds(lambda scene=scene: renderer.render(scene)) for _ in range(2))
+    return total / scenes
+
+
+def seconds(work: Callable[[], object]) -> float:
+    """Wall time of one call."""
+    start = time.perf_counter()
+    work()
+    return time.perf_counter() - start
+
+
+def loader(processes: int = 2) -> None:
+    """Packed 128x128 patches/s from a warm cache, and those that a training step of nafnet-tiny eats."""
+    import torch
+
+    from fsid.dataset.loader import PatchConfig, PatchDataset
+    from fsid.denoise import train_config
+    from fsid.denoise.raw_denoiser import RawDenoiser
+
+    with tempfile.TemporaryDirectory() as folder:
+        write_noise(Path(folder))
+        config = PatchConfig(128, 16, ("pixel6", "galaxy-s22"), 400, 8000)
+        patches = PatchDataset(Path(folder), config, seed=0)
+        alone_cpu, start = time.process_time(), time.perf_counter()
+        for step in range(20):
+            patches[step]
+        alone_cpu, alone = time.process_time() - alone_cpu, time.perf_counter() - start
+        queue = torch.utils.data.DataLoader(
+            patches, batch_size=None, sampler=range(120), num_workers=processes
+        )
+        times = [time.perf_counter() for _ in queue]
+        rate = 80 * config.batch / (times[-1] - times[-81])
+    small = train_config("nafnet-tiny")
+    net, shape = RawDenoiser(small.network), (small.batch, 4, small.patch_px, small.patch_px)
+    noisy, level = torch.rand(shape), torch.full((small.batch, 4), 1e-3)
+
+    def step() -> None:
+        net(noisy, level, level).square().mean().backward()
+
+    step()
+    eaten = small.batch / min(seconds(step) for _ in range(5)) * (small.patch_px / 128) ** 2
+    print(
+        f"loader: one process {320 / alone:.0f} patches/s ({320 / alone_cpu:.0f} per cpu second), "
+        f"{processes} processes {rate:.0f}; a training step of nafnet-tiny eats {eaten:.1f} "
+        f"(as many pixels): {rate / eaten:.0f} times as many"
+    )
+
+
+def write_noise(folder: Path) -> None:
+    """A dataset of 16 random full HD mosaics."""
+    import io
+
+    from fsid.sensor import Raw, write_dng
+
+    rng = np.random.default_rng(0)
+    for number in range(4):
+        samples = []
+        for i in range(4):
+            file = io.BytesIO()
+            x = rng.random((1080, 1920), np.float32)
+            write_dng(file, Raw(x, "GRBG", 4096, 65472, (2.0, 1.0, 1.5), np.eye(3)))
+            samples.append((f"{4 * number + i:08d}", {"clean.dng": file.getvalue()}))
+        write_shard(folder / f"shard-{number:05d}.tar", samples)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--pairs", type=int, default=4, help="pairs per measurement")
+    parser.add_argument("--scenes", type=int, default=60, help="scenes of the memory measurement")
+    parser.add_argument("--width", type=int, default=1920, help="of a frame, pixels; 16:9")
+    parser.add_argument("--only", choices=SECTIONS, help="one section")
+    options = parser.parse_args()
+    config = GenerateConfig(width=options.width, height=options.width * 9 // 32 * 2)
+    small = GenerateConfig(width=320, height=180, scene=SceneConfig(objects=(10, 20)))
+    sections: dict[str, Callable[[], None]] = {
+        "stages": lambda: stages(config, options.pairs),
+        "workers": lambda: workers(small, options.pairs),
+        "memory": lambda: memory(small, options.scenes),
+        "growth": lambda: growth(config),
+        "loader": loader,
+    }
+    for name in [options.only] if options.only else SECTIONS:
+        sections[name]()
+
+
+if __name__ == "__main__":
+    main()
