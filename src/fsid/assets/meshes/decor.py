@@ -52,79 +52,25 @@ def clock(rng: np.random.Generator) -> Parts:
     """Wall, desk or alarm clock: case, dial, hour marks, hands at any time, glass, perhaps bells and feet."""
     radius, deep = rng.uniform(0.05, 0.17), rng.uniform(0.02, 0.06)
     rim = radius * rng.uniform(0.06, 0.16)
-    case = [
-        lathe(
-            [
-                (0, 0),
-                (radius, 0),
-                (radius, deep),
-                (radius - 0.3 * rim, deep + 0.4 * rim),
-                (radius - rim, deep),
-                (radius - rim, 0.6 * deep),
-                (0, 0.6 * deep),
-            ],
-            56,
-            30,
-        )
-    ]
+    bezel = [(radius, deep), (radius - 0.3 * rim, deep + 0.4 * rim), (radius - rim, deep)]
+    case = lathe([(0, 0), (radius, 0), *bezel, (radius - rim, 0.6 * deep), (0, 0.6 * deep)], 56, 30)
     dial = cylinder(radius - rim + 0.0006, 0.0016, 0.0003, 48).at(z=0.6 * deep)
-    front, marks, hands = 0.6 * deep + 0.0016, [], []
+    front, marks = 0.6 * deep + 0.0016, []
     number = int(rng.choice((4, 12, 12, 60)))
     for k in range(number):
         long = radius * (0.12 if number < 60 or k % 5 == 0 else 0.05)
         mark = box(0.025 * radius, long, 0.001, 0.0002, 1).at(y=0.72 * radius, z=front - 0.0002)
         marks.append(mark.turned(z_deg=360 * k / number))
-    minute = rng.uniform(0, 60)
-    hour = rng.integers(12) + minute / 60
-    for k, (angle, long, wide) in enumerate(
-        ((hour / 12, 0.45, 0.035), (minute / 60, 0.68, 0.022), (rng.random(), 0.7, 0.008))
-    ):
-        y = np.linspace(-0.14, long, 6) * radius
-        half = np.interp(np.arange(6), (0, 4, 5), (1.0, rng.uniform(0.6, 1.8), 0.25)) * wide * radius
-        hand = slab(np.c_[-half, y], np.c_[half, y], 0.0009, 0.0002)
-        hands.append(hand.turned(z_deg=-360 * angle).at(z=front + 0.0022 + 0.0014 * k))
-    hands.append(cylinder(0.045 * radius, 0.0075, 0.001, 20).at(z=front - 0.0003))
-    dome = np.linspace(0, np.pi / 2, 7)
-    glass = lathe(
-        [
-            (0, 0),
-            *np.c_[(radius - rim + 0.001) * np.cos(dome), 0.16 * radius * np.sin(dome)][:-1],
-            (0, 0.16 * radius),
-        ],
-        48,
-    ).at(z=max(front + 0.0085, 0.85 * deep))
-    parts = {"case": case, "paper_dial": [dial], "marks": marks, "metal_hands": hands}
+    parts = {"case": [case], "paper_dial": [dial], "marks": marks}
+    parts["metal_hands"] = [hand.at(z=front) for hand in _clock_hands_rand(rng, radius)]
     if rng.random() < 0.4:
-        parts["glass"] = [glass]
+        t = np.linspace(0, np.pi / 2, 7)
+        dome = np.c_[(radius - rim + 0.001) * np.cos(t), 0.16 * radius * np.sin(t)]
+        pane = lathe([(0, 0), *dome[:-1], (0, 0.16 * radius)], 48)
+        parts["glass"] = [pane.at(z=max(front + 0.0085, 0.85 * deep))]
     parts = {name: [s.turned(x_deg=90).at(z=radius) for s in solids] for name, solids in parts.items()}
     if rng.random() < 0.5:
-        legs = [
-            sweep(np.array([(0, 0, 0), (0, 0, 0.3), (0, 0, 0.6)]) * radius, 0.06 * radius, 8)
-            .turned(y_deg=180 + 30 * s)
-            .at(s * 0.45 * radius, -deep / 2, 0.2 * radius)
-            for s in (-1, 1)
-        ]
-        bells = [
-            lathe(
-                [
-                    (0, 0),
-                    (0.33 * radius, 0),
-                    (0.3 * radius, 0.16 * radius),
-                    (0.14 * radius, 0.28 * radius),
-                    (0, 0.31 * radius),
-                ],
-                28,
-                60,
-            )
-            .turned(y_deg=35 * s)
-            .at(s * 0.6 * radius, -deep / 2, 1.86 * radius)
-            for s in (-1, 1)
-        ]
-        handle = np.linspace(0, np.pi, 16)
-        bow = np.c_[
-            0.6 * radius * np.cos(handle), 0 * handle - deep / 2, (2.1 + 0.4 * np.sin(handle)) * radius
-        ]
-        parts["metal_bells"] = [*legs, *bells, sweep(bow, 0.035 * radius, 8)]
+        parts["metal_bells"] = [p.at(y=-deep / 2) for p in _alarm(radius)]
     return parts
 
 
@@ -152,3 +98,29 @@ def _frame(x: float, z: float, wide: float, deep: float, bevel: float) -> list[S
     bars = [box(x, deep, wide, bevel, 3).at(z=s) for s in (0, z - wide)]
     upright = box(wide, deep - 0.0006, z - 1.4 * wide, bevel, 3).at(z=0.7 * wide)
     return bars + [upright.at(s * (x - wide - 0.0008) / 2) for s in (-1, 1)]
+
+
+def _clock_hands_rand(rng: np.random.Generator, radius: float) -> list[Solid]:
+    """Hour, minute and second hand on their pin, above z = 0, at a time that agrees."""
+    minute = rng.uniform(0, 60)
+    hour = rng.integers(12) + minute / 60
+    shapes = ((hour / 12, 0.45, 0.035), (minute / 60, 0.68, 0.022), (rng.random(), 0.7, 0.008))
+    hands = []
+    for k, (angle, long, wide) in enumerate(shapes):
+        y = np.linspace(-0.14, long, 6) * radius
+        half = np.interp(np.arange(6), (0, 4, 5), (1.0, rng.uniform(0.6, 1.8), 0.25)) * wide * radius
+        hand = slab(np.c_[-half, y], np.c_[half, y], 0.0009, 0.0002)
+        hands.append(hand.turned(z_deg=-360 * angle).at(z=0.0022 + 0.0014 * k))
+    return [*hands, cylinder(0.045 * radius, 0.0075, 0.001, 20).at(z=-0.0003)]
+
+
+def _alarm(radius: float) -> list[Solid]:
+    """Two legs, two bells and the bow of an alarm clock whose dial is centred at height `radius`."""
+    profile = np.array([(0, 0), (0.33, 0), (0.3, 0.16), (0.14, 0.28), (0, 0.31)]) * radius
+    bell = lathe(profile.tolist(), 28, 60)
+    leg = sweep(np.array([(0, 0, 0), (0, 0, 0.3), (0, 0, 0.6)]) * radius, 0.06 * radius, 8)
+    t = np.linspace(0, np.pi, 16)
+    bow = np.c_[0.6 * np.cos(t), 0 * t, 2.1 + 0.4 * np.sin(t)] * radius
+    legs = [leg.turned(y_deg=180 + 30 * s).at(s * 0.45 * radius, 0, 0.2 * radius) for s in (-1, 1)]
+    bells = [bell.turned(y_deg=35 * s).at(s * 0.6 * radius, 0, 1.86 * radius) for s in (-1, 1)]
+    return [*legs, *bells, sweep(bow, 0.035 * radius, 8)]

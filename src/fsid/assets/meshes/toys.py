@@ -107,16 +107,7 @@ def toy_car(rng: np.random.Generator) -> Parts:
                 0.5 * x * (1 - tail), 0, wheel + z - 0.001
             )
         )
-    tyres, hubs = [], []
-    axles = np.array((-0.31, 0.31)) if not truck else np.array((-0.32, 0.16, 0.36))
-    for px in axles * x:
-        for s in (-1, 1):
-            tyre = cylinder(wheel, 0.009, 0.0025, 28).warped(fluted(28, 0.05, 0.0))
-            tyres.append(tyre.at(z=-0.0045).turned(x_deg=90).at(px, s * (y / 2 - 0.001), wheel))
-            hub = lathe(
-                [(0, 0), (0.6 * wheel, 0), (0.5 * wheel, 0.002), (0.2 * wheel, 0.001), (0, 0.0025)], 20
-            )
-            hubs.append(hub.turned(x_deg=-90 * s).at(px, s * (y / 2 + 0.003), wheel))
+    tyres, hubs = _wheels(x * np.array((-0.32, 0.16, 0.36) if truck else (-0.31, 0.31)), y, wheel)
     lamps = [ball(0.12 * z + 0.001, 2).at(-x / 2 + 0.001, s * 0.34 * y, wheel + 0.55 * z) for s in (-1, 1)]
     bumpers = [box(0.006, 0.96 * y, 0.2 * z, 0.0015).at(s * x / 2, 0, wheel + 0.1 * z) for s in (-1, 1)]
     return {
@@ -173,6 +164,16 @@ def _block_rand(rng: np.random.Generator, size: float) -> tuple[Solid, float]:
         ]
         return slab(inner, outer, size, 0.0015).turned(x_deg=90).at(y=size / 2), 1.05 * size
     return cone(size / 2, 0.05 * size, tall, 0.002, 24), 0.0
+
+
+def _wheels(axles: np.ndarray, track: float, radius: float) -> tuple[list[Solid], list[Solid]]:
+    """Tyres and hubs of a vehicle on z = 0 with its axles at these x."""
+    tyre = cylinder(radius, 0.009, 0.0025, 28).warped(fluted(28, 0.05, 0.0)).at(z=-0.0045).turned(x_deg=90)
+    dish = [(0, 0), (0.6 * radius, 0), (0.5 * radius, 0.002), (0.2 * radius, 0.001), (0, 0.0025)]
+    hub = lathe(dish, 20)
+    places = [(float(x), s) for x in axles for s in (-1, 1)]
+    tyres = [tyre.at(x, s * (track / 2 - 0.001), radius) for x, s in places]
+    return tyres, [hub.turned(x_deg=-90 * s).at(x, s * (track / 2 + 0.003), radius) for x, s in places]
 
 
 def _gear(rng: np.random.Generator, teeth: int, radius: float, bite: float, tall: float) -> list[Solid]:
