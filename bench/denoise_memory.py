@@ -50,9 +50,8 @@ def main() -> None:
         subprocess.run([*command, "--quiet"], check=True)
         seconds = time.perf_counter() - start
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    print(
-        f"{x.size / 1e6:.1f} MP: peak {used.ru_maxrss / 1e6:.2f} GB, {seconds:.0f} s, CPU {used.ru_utime:.0f} s"
-    )
+    peak_gb, cpu_s = used.ru_maxrss / 1e6, used.ru_utime
+    print(f"{x.size / 1e6:.1f} MP: peak {peak_gb:.2f} GB, {seconds:.0f} s, CPU {cpu_s:.0f} s")
 
 
 if __name__ == "__main__":

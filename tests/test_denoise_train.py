@@ -184,7 +184,7 @@ def test_learning_rate_rises_and_falls() -> None:
     assert rates[-1] == pytest.approx(0.01, rel=0.1)
 
 
-@pytest.mark.parametrize("name", ["nafnet-tiny", "nafnet-small", "nafnet-32", "nafnet-64"])
+@pytest.mark.parametrize("name", ["nafnet-tiny", "nafnet-small", "nafnet-32", "nafnet-64", "paper"])
 def test_shipped_configs_are_valid(name: str) -> None:
     with as_file(files("fsid.configs").joinpath(f"{name}.yaml")) as file:
         assert load_settings(TrainConfig, file).steps > 1
