@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fsid.assets.material_registry import Layers, material_family, pictured
-from fsid.assets.patterns import cells, edge, level, noise, warp
+from fsid.assets.patterns import cells, edge, level, noise
 
 
 @material_family(
@@ -17,9 +17,9 @@ from fsid.assets.patterns import cells, edge, level, noise, warp
 def bread(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """Crumb with bubbles of many sizes, crust with flour and seeds for odd variants."""
     pores = np.zeros((size, size), np.float32)
+    bend = np.stack([noise(rng, size, 1.9, low=3, high=60) for _ in range(2)])
     for count, weight in ((9, 1.0), (24, 0.8), (60, 0.6)):
-        shift = 0.2 * np.stack([noise(rng, size, 1.8, low=3, high=2 * count) for _ in range(2)])
-        near, _, value = cells(rng, size, count, 0.95, shift)
+        near, _, value = cells(rng, size, count, 0.95, bend * np.float32(0.2 * count**0.5 / 5))
         keep = value > (0.3, 0.85, 0.5, 0.6)[variant]
         pores = np.maximum(pores, weight * keep * edge(0.12 + 0.25 * value - near, 0, 0.1))
     crumb = noise(rng, size, 1.0, low=12)
@@ -140,7 +140,7 @@ def cheese(rng: np.random.Generator, variant: int, size: int) -> Layers:
 @material_family("salad", tile_m=0.3, relief_m=0.006, colours="picture")
 def salad(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """Chopped vegetables: crumpled greens, orange and red slices, white rings, herbs."""
-    bend = [noise(rng, size, 1.6, low=3, high=80) * np.float32(0.02) for _ in range(2)]
+    bend = np.stack([noise(rng, size, 1.6, low=3, high=80) for _ in range(2)]) * np.float32(0.02)
     palette = np.array(
         (
             ((0.35, 0.55, 0.15), (0.55, 0.7, 0.25), (0.85, 0.2, 0.12), (0.9, 0.9, 0.8)),
@@ -153,8 +153,7 @@ def salad(rng: np.random.Generator, variant: int, size: int) -> Layers:
     rgb = np.zeros((size, size, 3), np.float32)
     height = np.zeros((size, size), np.float32)
     for count in (7, 13, 24):
-        near, second, value = cells(rng, size, count, 0.95)
-        near, second, value = (warp(f, *bend) for f in (near, second, value))
+        near, second, value = cells(rng, size, count, 0.95, bend * np.float32(count))
         dome = np.sqrt(np.clip(second - near, 0, 1)) * (0.6 + 0.4 * value)
         rings = 0.5 + 0.5 * np.cos(2 * np.pi * near * (4 + 8 * value))
         tone = palette[np.clip((value * 3.999 * 7) % 4, 0, 3).astype(int)]
