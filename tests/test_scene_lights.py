@@ -6,11 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fsid.assets import PART_KINDS
+from fsid.assets import PART_KINDS, material_families
 from fsid.errors import FsidError
 from fsid.scene import BackgroundConfig, LightConfig, MaterialConfig, SceneConfig, sample
 from fsid.scene.lobes import EMISSION, LOBES, lobes_rand
 from fsid.scene.materials import PLAIN
+from fsid.scene.pools import POOLS
 from fsid.scene.sources import sky_rand
 
 ROOM = BackgroundConfig(kind_shares=(1.0, 0.0, 0.0, 0.0))
@@ -143,3 +144,26 @@ def test_meshes_and_textures_come_from_folders_wherever_these_lie(tmp_path: Path
 
 
 _TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
+
+
+def test_every_pool_names_families_that_exist():
+    for surface, pool in POOLS.items():
+        assert len(pool) >= 5, surface
+        assert set(pool) <= set(material_families()), surface
+
+
+def test_no_area_light_turns_its_back_to_the_camera_in_view():
+    lights = LightConfig(kind_shares=(0.0, 0.0, 1.0), count=(2, 2))
+    areas = 0
+    for seed in range(30):
+        s = scene(seed, background=ROOM, lights=lights)
+        eye = np.array(s.cameras[0].position_m)
+        to_focus = np.array((0.0, 0.0, 0.35)) - eye
+        for light in s.lights:
+            if light.kind == "area":
+                areas += 1
+                to_light = np.array(light.position_m) - eye
+                behind = to_light @ light.direction > 0
+                cosine = to_light @ to_focus / np.linalg.norm(to_light) / np.linalg.norm(to_focus)
+                assert not behind or cosine < np.cos(np.radians(45)), seed
+    assert areas > 30

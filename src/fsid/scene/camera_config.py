@@ -1,4 +1,6 @@
-"""How a scene is seen: view, rig, movement and lens. The defaults are one still camera with a good lens, nearly always sharp."""
+"""How a scene is seen: view, rig, movement and lens.
+
+The defaults are one still camera with a good lens, nearly always sharp."""
 
 # ruff: noqa: RUF009  (a knob is a dataclass field)
 from __future__ import annotations

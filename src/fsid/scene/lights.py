@@ -28,8 +28,8 @@ SUN_TANGENT = 0.0047
 _LUMINANCE = np.array((0.2126, 0.7152, 0.0722))
 _LEAST_PRIMARY = 0.05
 """Candle light has no blue within sRGB: this much is left, for the camera to amplify."""
-_NEAR_VIEW_DEG = 40.0
-"""An area light nearer than this to the line from focus to camera changes sides, not to block the view."""
+_VIEW_DEG = 55.0
+"""Within this angle of the line of sight no area light turns its dark back to the camera."""
 
 
 class Lighting(NamedTuple):
@@ -89,21 +89,12 @@ def _lamp_rand(
     radius_m = log_uniform_rand(rng, config.radius_m)
     size_m = np.array([log_uniform_rand(rng, config.area_m) for _ in range(2)])
     if kind == "area":
-        to_camera = (camera_m - focus_m) / np.linalg.norm(camera_m - focus_m)
-        if direction @ to_camera > np.cos(np.radians(_NEAR_VIEW_DEG)):
-            direction = direction * (-1, -1, 1)
-        size_m = np.minimum(size_m, 0.6 * space.reach(focus_m, direction, distance))
-        reach = space.reach(focus_m, direction, distance, float(np.hypot(*size_m)) / 2 - 0.15)
-        colour = rgb * irradiance * reach**2 / size_m.prod()
-        return Light(
-            kind,
-            vec3(focus_m + direction * reach),
-            vec3(-direction),
-            vec3(colour),
-            0.0,
-            180.0,
-            (float(size_m[0]), float(size_m[1])),
-        )
+        panel = _panel(space, focus_m, camera_m, direction, distance, size_m)
+        if panel:
+            position_m, outward, edges_m = panel
+            colour = rgb * irradiance * float(np.sum((position_m - focus_m) ** 2)) / (edges_m[0] * edges_m[1])
+            return Light("area", vec3(position_m), vec3(-outward), vec3(colour), 0.0, 180.0, edges_m)
+        kind = "point"
     reach = space.reach(focus_m, direction, distance)
     aim = aim - direction
     return Light(
@@ -114,6 +105,30 @@ def _lamp_rand(
         radius_m=min(radius_m, 0.3 * reach),
         cone_deg=cone_deg if kind == "spot" else 360.0,
     )
+
+
+def _panel(
+    space: Space,
+    focus_m: np.ndarray,
+    camera_m: np.ndarray,
+    direction: np.ndarray,
+    distance: float,
+    size_m: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, tuple[float, float]] | None:
+    """Place, direction from the focus and edges of an area light that fits; None where its back is in view.
+
+    The four mirror images of the drawn direction are tried in turn.
+    """
+    for sx, sy in ((1, 1), (-1, -1), (1, -1), (-1, 1)):
+        outward = direction * (sx, sy, 1)
+        width, height = np.minimum(size_m, 0.6 * space.reach(focus_m, outward, distance))
+        reach = space.reach(focus_m, outward, distance, float(np.hypot(width, height)) / 2 - 0.15)
+        position_m = focus_m + outward * reach
+        to_light, to_focus = position_m - camera_m, focus_m - camera_m
+        cosine = to_light @ to_focus / np.linalg.norm(to_light) / np.linalg.norm(to_focus)
+        if to_light @ outward > 0 or cosine < np.cos(np.radians(_VIEW_DEG)):
+            return position_m, outward, (float(width), float(height))
+    return None
 
 
 def _lamp_colour_rand(rng: np.random.Generator, config: LightConfig) -> np.ndarray:
