@@ -154,6 +154,10 @@ def loader(processes: int = 2) -> None:
         )
         times = [time.perf_counter() for _ in queue]
         rate = 80 * config.batch / (times[-1] - times[-81])
+    print(
+        f"loader: one process {320 / alone:.0f} patches/s ({320 / alone_cpu:.0f} per cpu second), "
+        f"{processes} processes {rate:.0f}"
+    )
     small = train_config("nafnet-tiny")
     net, shape = RawDenoiser(small.network), (small.batch, 4, small.patch_px, small.patch_px)
     noisy, level = torch.rand(shape), torch.full((small.batch, 4), 1e-3)
@@ -162,11 +166,10 @@ def loader(processes: int = 2) -> None:
         net(noisy, level, level).square().mean().backward()
 
     step()
-    eaten = small.batch / min(seconds(step) for _ in range(5)) * (small.patch_px / 128) ** 2
+    eaten = small.batch / min(seconds(step) for _ in range(3)) * (small.patch_px / 128) ** 2
     print(
-        f"loader: one process {320 / alone:.0f} patches/s ({320 / alone_cpu:.0f} per cpu second), "
-        f"{processes} processes {rate:.0f}; a training step of nafnet-tiny eats {eaten:.1f} "
-        f"(as many pixels): {rate / eaten:.0f} times as many"
+        f"a training step of nafnet-tiny eats {eaten:.1f} patches/s of as many pixels: the loader makes "
+        f"{rate / eaten:.0f} times as many"
     )
 
 
