@@ -3,7 +3,7 @@
 What may differ between two renders of one scene is where the taps of shadows and occlusion lie and where the
 samples lie in a pixel. Differences are scaled to mid-grey 0.18 and compared with 5 % of a read noise of 5e-4,
 the weakest of the built-in profiles. Smooth: one object, and radiance within 3 % over 5 x 5 pixels.
-(Measured: 90 % of smooth pixels below 1.4e-5, root mean square of the fine grain 3.6e-5 for other taps and
+(Measured: 90 % of smooth pixels below 1.2e-5, root mean square of the fine grain 3.6e-5 for other taps and
 4.0e-5 for another phase; what is left lies where things touch the floor.)
 """
 

@@ -224,6 +224,10 @@ void main() {
     vec3 down = (ray_at(vec2(pixel) + vec2(0.5, 1.5)) - local) * axes;
     int count = grid * grid, middle = (grid / 2) * (grid + 1);
     uint open = (1u << count) - 1u;
+#if GLASS
+    // Where there is no glass nothing is shaded: loops over no samples and no lights are left at once.
+    for (int i = 0; i < count; ++i) open &= sample_at(place_of(pixel, i)).surface < 0 ? ~(1u << i) : ~0u;
+#endif
     vec3 sum = vec3(0), albedo = vec3(0), relief = vec3(0);
     int id = 0;
     float covered = 0.0;
