@@ -62,7 +62,7 @@ class TestEveryFamily:
                     assert steps[-1] <= 1.5 * steps[:-1].max() + 1e-4, (variant, name)
 
     def test_the_smallest_size_works_too(self, family):
-        for variant in range(MATERIAL_VARIANTS):
+        for variant in (0, MATERIAL_VARIANTS - 1):
             assert np.isfinite(draw_material(family, variant, 64).detail).all()
 
     def test_no_map_is_mostly_clipped(self, baked, family):
