@@ -14,7 +14,7 @@ from fsid.assets import MATERIAL_VARIANTS, bake_material, material_families
 from fsid.errors import FsidError
 from fsid.render import Frame, Renderer
 from fsid.render.layers import LayerStore
-from fsid.scene import Scene, SceneConfig, sample
+from fsid.scene import LightConfig, Scene, SceneConfig, sample
 
 CONFIG = SceneConfig(objects=(6, 8))
 
@@ -37,7 +37,9 @@ def renderer() -> Iterator[Renderer]:
 def test_again_and_after_other_scenes(renderer: Renderer) -> None:
     first = fingerprint(renderer.render(scene(1)))
     assert fingerprint(renderer.render(scene(1))) == first
-    renderer.render(sample(SceneConfig(objects=(4, 4), lights=5), 2, width=160, height=90))
+    renderer.render(
+        sample(SceneConfig(objects=(4, 4), lights=LightConfig(count=(5, 5))), 2, width=160, height=90)
+    )
     assert fingerprint(renderer.render(scene(3))) != first
     assert fingerprint(renderer.render(scene(1))) == first
 
