@@ -12,11 +12,13 @@ pytest.importorskip("onnxscript")
 onnx = pytest.importorskip("onnx")
 onnxruntime = pytest.importorskip("onnxruntime")
 
-from fsid.denoise import Denoiser, ModelCard, NetworkConfig, RawDenoiser, denoise_raw  # noqa: E402
+from fsid.cli.main import main  # noqa: E402
+from fsid.denoise import Denoiser, ModelCard, NetworkConfig, RawDenoiser, denoise_raw, save_model  # noqa: E402
 from fsid.denoise.onnx_denoiser import OnnxDenoiser, load_onnx, onnx_denoiser  # noqa: E402
-from fsid.denoise.onnx_export import onnx_bytes  # noqa: E402
+from fsid.denoise.onnx_export import onnx_bytes, onnx_model  # noqa: E402
+from fsid.denoise.quality import probes  # noqa: E402
 from fsid.errors import FsidError  # noqa: E402
-from fsid.sensor import Raw, load_profile  # noqa: E402
+from fsid.sensor import Raw, load_profile, read_raw, write_dng  # noqa: E402
 
 NETWORK = NetworkConfig(width=4, encoder_blocks=(1, 1), middle_blocks=1, decoder_blocks=(1, 1))
 LEVEL = load_profile("pixel6").level(3200)
@@ -73,6 +75,50 @@ def test_the_graph_alone_is_enough(rng: np.random.Generator, denoiser: Denoiser,
         assert word.lower() in notes["description"].lower()
     assert notes["multiple"] == "4"
     assert notes["patch_px"] == "16"
+
+
+def test_the_command_writes_a_smaller_form_and_denoise_runs_it(
+    rng: np.random.Generator,
+    denoiser: Denoiser,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    few = probes(("coffee.png",))[:1]
+    monkeypatch.setattr("fsid.denoise.export.probes", lambda: few)
+    monkeypatch.setattr("fsid.denoise.onnx_int8.probes", lambda names: few)
+    save_model(tmp_path / "model.safetensors", denoiser.net.state_dict(), denoiser.card)
+    small = tmp_path / "small.onnx"
+    main(["export", str(tmp_path / "model.safetensors"), str(small), "--precision", "int8"])
+    assert "int8" in capsys.readouterr().err
+    kinds = {node.op_type for node in onnx.load(small).graph.node}
+    assert {"QuantizeLinear", "DequantizeLinear"} <= kinds
+    assert str(tmp_path) not in small.read_bytes().decode("latin1")  # no paths, no stack traces
+    assert "site-packages" not in small.read_bytes().decode("latin1")
+    raw = noisy_raw(rng, 96, 128)
+    write_dng(tmp_path / "noisy.dng", raw)
+    main(
+        [
+            "denoise",
+            str(tmp_path / "noisy.dng"),
+            str(tmp_path / "clean.dng"),
+            "--model",
+            str(small),
+            "--quiet",
+        ]
+    )
+    expected = denoise_raw(read_raw(tmp_path / "noisy.dng"), denoiser).mosaic
+    got = read_raw(tmp_path / "clean.dng").mosaic
+    assert np.corrcoef(got.ravel(), expected.clip(max=1).ravel())[0, 1] > 0.98
+
+
+def test_half_precision_stays_near(rng: np.random.Generator, denoiser: Denoiser) -> None:
+    graph = onnx_model(denoiser, half=True)
+    assert any(tensor.data_type == onnx.TensorProto.FLOAT16 for tensor in graph.graph.initializer)
+    raw = noisy_raw(rng, 64, 64)
+    half = denoise_raw(raw, onnx_denoiser(graph.SerializeToString(), "half")).mosaic
+    single = denoise_raw(raw, denoiser).mosaic
+    assert np.abs(half - single).max() < 0.1 * np.abs(single - raw.mosaic).mean()
 
 
 def test_what_is_no_exported_network_is_named(tmp_path: Path) -> None:
