@@ -3,9 +3,10 @@
     gain = min(key / median(Y), 1 / percentile(Y, 100 - clipped)),      Y = luminance of the frame
 
 A camera meters the scene to a mid-grey and backs off for highlights, and neither exactly. So `key` is
-log-uniform over 0.06 to 0.25 (an 18 % card, two thirds of a stop over to more than one and a half under)
-and the share of pixels that may reach saturation is log-uniform over 0.05 % to 3 %: every frame keeps some
-clipped highlights, few are burnt out, and a scene of high contrast sinks its shadows into read noise.
+log-uniform over 0.1 to 0.4 (an 18 % card, a little more than a stop over to a little less than one under) and
+the share of pixels that may reach saturation is log-uniform over 0.2 % to 8 %: every frame keeps some
+clipped highlights, few are burnt out. With these, lightness and clipping of rendered frames lie as those of
+photographs do on the sensor (docs/results.md); half a stop less, and the frames were too dark.
 Low light needs no darker image: the camera answers it with ISO, and ISO sets the noise.
 """
 
@@ -16,8 +17,8 @@ import numpy as np
 from fsid.errors import FsidError
 from fsid.sensor.colour import SRGB_TO_XYZ
 
-KEY_RANGE = (0.06, 0.25)
-CLIPPED_PERCENT_RANGE = (0.05, 3.0)
+KEY_RANGE = (0.1, 0.4)
+CLIPPED_PERCENT_RANGE = (0.2, 8.0)
 
 
 def exposure_rand(rng: np.random.Generator, radiance: np.ndarray) -> float:
