@@ -124,10 +124,10 @@ def test_exposure_clips_few_highlights_and_places_the_middle_where_it_says():
         luminance = expose(np.random.default_rng(seed), radiance) @ SRGB_TO_XYZ[1]
         clipped.append(np.mean(luminance > 1))
         middle.append(np.median(luminance))
-    assert max(clipped) <= 0.0305
+    assert max(clipped) <= 0.0805
     assert np.mean(np.array(clipped) > 0) > 0.5
-    assert max(middle) <= 0.2501
-    assert np.median(middle) > 0.03
+    assert max(middle) <= 0.4001
+    assert np.median(middle) > 0.05
 
 
 @settings(max_examples=20, deadline=None)
