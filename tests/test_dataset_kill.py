@@ -165,7 +165,7 @@ def test_a_full_disk_is_one_line_and_the_next_run_finishes(tiny: list[str], tmp_
 
 def test_a_folder_that_cannot_be_written_is_one_line(tiny: list[str], tmp_path: Path) -> None:
     finish(tmp_path, tiny, 4, SHARD)
-    with immutable(tmp_path), pytest.raises(FsidError, match=r"shard-00001\.tar: cannot be written"):
+    with immutable(tmp_path), pytest.raises(FsidError, match="cannot be written"):
         finish(tmp_path, tiny, 8, SHARD)
     finish(tmp_path, tiny, 8, SHARD)
     assert len(content(tmp_path)) == 2

@@ -113,7 +113,7 @@ def generate(
         progress(done, count)
         tasks_per_worker = max(1, SAMPLES_PER_WORKER // dataset.shard_size)
         if todo:
-            (out / CARD).unlink(missing_ok=True)
+            _withdraw_card(out)
             for _, made in run(workforce.crew(), todo, tasks_per_worker=tasks_per_worker, lost=lost):
                 done += made
                 progress(done, count)
@@ -160,6 +160,14 @@ def _locked(out: Path) -> Iterator[None]:
     finally:
         remove_parts(out)
         os.close(folder)
+
+
+def _withdraw_card(out: Path) -> None:
+    """A card is there only while all samples are."""
+    try:
+        (out / CARD).unlink(missing_ok=True)
+    except OSError as error:
+        raise FsidError(f"{out}: cannot be written ({error.strerror})") from None
 
 
 def _claim(out: Path, dataset: DatasetConfig) -> None:
