@@ -80,7 +80,7 @@ def _landscape(rng: np.random.Generator, height: int, width: int, cloud: np.ndar
         image = np.where((y > top)[..., None], _mixed(horizon * 0.8, tone, 0 * x + 0 * y + depth), image)
     if rng.random() < 0.4:
         shore = float(y.max() - (y.max() - horizon_y) * rng.uniform(0.2, 0.6))
-        row = np.searchsorted(y[:, 0], shore)
+        row = int(np.searchsorted(y[:, 0], shore))
         mirrored = image[::-1][-max(row, 1) :][: height - row]
         image[row : row + len(mirrored)] = mirrored * 0.75 + 0.03 * cloud[: len(mirrored), :, None]
     return image
@@ -126,8 +126,8 @@ def _blossoms(rng: np.random.Generator, height: int, width: int, cloud: np.ndarr
                 shape = np.c_[
                     cx + px * np.cos(angle) - py * np.sin(angle), cy + px * np.sin(angle) + py * np.cos(angle)
                 ]
-                rgb = np.uint8(np.clip(tone * rng.uniform(0.75, 1.05), 0, 1) * 255)
-                draw.polygon(shape.ravel().tolist(), fill=(int(rgb[0]), int(rgb[1]), int(rgb[2])))
+                r, g, b = (int(v) for v in np.clip(tone * rng.uniform(0.75, 1.05), 0, 1) * 255)
+                draw.polygon(shape.ravel().tolist(), fill=(r, g, b))
             heart = reach * 0.18
             draw.ellipse((cx - heart, cy - heart, cx + heart, cy + heart), fill=(200, 150, 30))
         if blurred:
