@@ -20,7 +20,7 @@ class CameraConfig:
     """Angle above the horizon seen from the focus: low views see walls and horizon, high ones the ground."""
     fov_deg: Range = knob((28.0, 72.0), 5.0, 150.0)
     """Horizontal field of view."""
-    roll_deg: float = knob(4.0, 0.0, 180.0)
+    roll_deg: float = knob(2.5, 0.0, 180.0)
     """Standard deviation of the camera's roll."""
 
     def __post_init__(self) -> None:

@@ -45,7 +45,7 @@ class PlacementConfig:
 class MaterialConfig:
     """M: how baked families are coloured and finished."""
 
-    plain_share: float = knob(0.12, 0.0, 1.0)
+    plain_share: float = knob(0.24, 0.0, 1.0)
     """Share of surfaces in plain paint: homogeneous areas exist in reality too."""
     tile_scale: Range = knob((0.25, 1.2), 0.01, 100.0)
     """Texture tile width on objects relative to the natural width of its family; log-uniform."""
@@ -55,7 +55,7 @@ class MaterialConfig:
     """Factor on the relief of the height maps."""
     albedo: Range = knob((0.02, 0.9), 0.0, 1.0)
     """Limits of the linear albedo of surface colours, per channel."""
-    palette_shares: tuple[float, float, float, float] = shares(0.5, 0.25, 0.04, 0.21)
+    palette_shares: tuple[float, float, float, float] = shares(0.5, 0.2, 0.03, 0.27)
     """Shares of the palette models natural, harmonised, lab, grey."""
     contrast: Range = knob((0.1, 0.9), 0.0, 1.0)
     """How far the colours of one material may lie apart: 1 as drawn, 0 all alike."""
@@ -90,11 +90,11 @@ class BackgroundConfig:
     """Height of the hills towards the horizon."""
     pool_share: float = knob(0.7, 0.0, 1.0)
     """Share of surfaces whose material comes from the pool of their sort (`fsid.scene.pools`)."""
-    plain_share: float = knob(0.2, 0.0, 1.0)
+    plain_share: float = knob(0.4, 0.0, 1.0)
     """Share of walls, ceilings and backdrops in plain paint."""
     tile_scale: Range = knob((0.5, 1.6), 0.01, 100.0)
     """Texture tile width on backgrounds relative to the natural width of its family; log-uniform."""
-    aligned_share: float = knob(0.8, 0.0, 1.0)
+    aligned_share: float = knob(0.95, 0.0, 1.0)
     """Share of surfaces whose texture lies along their edges, as planks and bricks do."""
 
     def __post_init__(self) -> None:
@@ -123,7 +123,7 @@ class LightConfig:
     """Edges of an area light; log-uniform."""
     distance_m: Range = knob((0.9, 2.4), 0.1, 100.0)
     """Distance of a lamp from the focus."""
-    ambient_share: Range = knob((0.3, 2.5), 1e-4, 10.0)
+    ambient_share: Range = knob((0.5, 3.0), 1e-4, 10.0)
     """Irradiance from the surroundings relative to that from the lights; log-uniform."""
     sun_share: float = knob(0.6, 0.0, 1.0)
     """Share of open-air scenes with sunlight; the others have an overcast sky or, by `night_share`, lamps."""
