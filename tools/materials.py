@@ -39,9 +39,9 @@ any power of two from 64 to 8192 texels, and every use recolours them. A family 
 ```python
 from fsid.assets import bake_material, material_colours, material_families, material_layers
 
-maps = bake_material("brick", 2, 1024)        # (S, S): mix, pattern, detail, roughness, height, metallic
-material_colours("brick", 2)                  # what its three colours are in nature; None where any will do
-bake_material("brick+dirt+dust", 2, 1024)     # the same under layers, see below
+maps = bake_material("brick", 2, 1024)  # (S, S): mix, pattern, detail, roughness, height, metallic
+material_colours("brick", 2)  # what its three colours are in nature; None where any will do
+bake_material("brick+dirt+dust", 2, 1024)  # the same under layers, see below
 bake_material("file:textures/Bricks001_1K-JPG", 0, 1024)  # a texture set of your own
 ```
 
