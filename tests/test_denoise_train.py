@@ -129,8 +129,15 @@ def test_two_processes_train_one_network(data: Path, tmp_path: Path) -> None:
     assert any(not torch.equal(both[name], alone[name]) for name in both)
 
 
-def test_the_best_network_on_held_out_scenes_is_kept(tmp_path: Path) -> None:
+def test_the_best_network_on_held_out_scenes_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A learning rate that ends in ruin: the best network is an early one, and the last one is worse."""
+
+    def ruinous(config: TrainConfig, step: int) -> float:
+        return 0.5 if step >= 35 else learning_rate(config, step)
+
+    monkeypatch.setattr(sys.modules["fsid.denoise.train"], "learning_rate", ruinous)
     folder, rng = tmp_path / "data", np.random.default_rng(3)
     folder.mkdir()
     write_shard(shard_path(folder, 0), [stored(rng, number) for number in range(10)])
