@@ -131,3 +131,15 @@ def test_the_readme_names_every_command_and_no_other():
     text = (REPOSITORY / "README.md").read_text(encoding="utf-8")
     named = set(re.findall(r"^\| `fsid ([a-z]+)", text, re.M))
     assert named == set(COMMANDS)
+
+
+def test_the_python_of_the_readme_runs(desk: Path, monkeypatch: pytest.MonkeyPatch):
+    """With the network that ships; runs after the guides, which leave noisy.dng behind."""
+    monkeypatch.chdir(desk)
+    (block,) = re.findall(
+        r"```python\n(.*?)```", (REPOSITORY / "README.md").read_text(encoding="utf-8"), re.S
+    )
+    exec(compile(block, "README.md", "exec"), {})
+    clean, noisy = read_raw(desk / "clean.dng"), read_raw(desk / "noisy.dng")
+    assert clean.mosaic.shape == noisy.mosaic.shape
+    assert np.abs(np.diff(clean.mosaic[::2, ::2])).mean() < np.abs(np.diff(noisy.mosaic[::2, ::2])).mean()
