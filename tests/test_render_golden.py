@@ -1,34 +1,24 @@
 """Golden images, 160 x 90: what the laws do not pin down must not change unnoticed.
 
-The references are 8-bit sRGB at an exposure fixed per scene, and the tolerance is what another driver's
-rasterisation of edges and rounding of texture filters may cost: a mean difference of 0.5 % of full scale and
-8 % at the 99.9th percentile after a 3 x 3 average. A failure writes image, reference and difference to
-`test-output/`. To make new references, look at the images there, then run
-
-    FSID_UPDATE_GOLDEN=1 pytest tests/test_render_golden.py
+Every kind of light, lens and lobe, at an exposure fixed per scene; tolerance, files of a failure and new
+references: golden_images.py. The material families have a sheet of their own in test_render_materials.py.
 """
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
-from scipy.ndimage import uniform_filter
 
 from fsid.assets import MaterialMaps
 from fsid.render import Renderer
 from fsid.render.drawable import Drawable, View, background_drawable, panel_drawable
 from fsid.scene.model import Background, Camera, Distortion, Light, Material, Motion, Sky, Transform
+from golden_images import difference_from, encoded, keep_failure, too_different
 from render_scenes import bake_plain, block, grid, plain, point_light, sphere
 
-GOLDEN = Path(__file__).parent / "golden"
-OUTPUT = Path(__file__).resolve().parents[1] / "test-output"
-MEAN_TOLERANCE, PEAK_TOLERANCE = 0.005, 0.08
 CAMERA = Camera((0.1, -2.0, 1.3), (0.0, 0.0, 0.35), (0.05, 0.0, 1.0), 52.0, 160, 90)
 NAMES = ("floor", "ceiling", "wall_north", "wall_south", "wall_east", "wall_west")
 ONE = (1.0, 1.0, 1.0)
@@ -214,30 +204,13 @@ def renderer() -> Iterator[Renderer]:
         yield renderer
 
 
-def encoded(radiance: np.ndarray, exposure: float) -> np.ndarray:
-    """sRGB, 0..1."""
-    x = np.clip(radiance * exposure, 0.0, 1.0)
-    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.maximum(x, 1e-9) ** (1 / 2.4) - 0.055)
-
-
-def save(path: Path, image: np.ndarray) -> None:
-    path.parent.mkdir(exist_ok=True)
-    Image.fromarray(np.rint(np.clip(image, 0, 1) * 255).astype(np.uint8)).save(path, optimize=True)
-
-
 @pytest.mark.parametrize("name", SCENES)
 def test_golden_image(renderer: Renderer, name: str) -> None:
     make, exposure = SCENES[name]
     frame = renderer.draw(make(), bake=bake)
     assert np.isfinite(frame.radiance).all()
     assert frame.radiance.min() >= 0.0
-    image, path = encoded(frame.radiance, exposure), GOLDEN / f"{name}.png"
-    if os.environ.get("FSID_UPDATE_GOLDEN"):
-        save(path, image)
-    reference = np.asarray(Image.open(path), dtype=float) / 255
-    difference = uniform_filter(np.abs(image - reference), (3, 3, 0))
-    mean, peak = difference.mean(), np.quantile(difference, 0.999)
-    if mean > MEAN_TOLERANCE or peak > PEAK_TOLERANCE:
-        for suffix, picture in (("image", image), ("reference", reference), ("difference", difference * 5)):
-            save(OUTPUT / f"{name}-{suffix}.png", picture)
-        pytest.fail(f"{name}: mean {mean:.4f}, 99.9 % {peak:.4f}; see test-output/{name}-*.png")
+    image = encoded(frame.radiance, exposure)
+    difference = difference_from(name, image)
+    if what := too_different(difference):
+        pytest.fail(f"{name}: {what}; {keep_failure(name, image, difference)}")
