@@ -261,6 +261,9 @@ def test_sampled_scenes_are_finite_and_without_fireflies(renderer: Renderer) -> 
         assert (luminance[2:-2, 2:-2] < 50 * others + 0.05 * luminance.mean()).all()
 
 
+WALLS = ("wall_east", "wall_west", "wall_north", "wall_south")
+
+
 def simple_scene(**light: object):
     scene = sample(SceneConfig(objects=(1, 1)), 0, width=32, height=32)
     return replace(scene, lights=(replace(point_light((0.0, 0.0, 1.0)), **light),))
@@ -277,6 +280,21 @@ def simple_scene(**light: object):
 def test_a_light_that_makes_no_sense_is_named(light: dict, message: str) -> None:
     with pytest.raises(FsidError, match=message):
         view_of(simple_scene(**light), 0)
+
+
+def test_a_sky_above_a_closed_room_is_refused() -> None:
+    room = Background("room", (3.0, 3.0, 2.5), dict.fromkeys(("floor", "ceiling", *WALLS), plain()))
+    scene = replace(simple_scene(), background=room, sky=Sky("procedural", ONE))
+    with pytest.raises(FsidError, match=r"scene\.sky: a closed 'room'"):
+        view_of(scene, 0)
+    assert view_of(replace(scene, sky=None), 0).sky is None
+
+
+def test_the_sampler_gives_a_sky_to_open_air_alone() -> None:
+    config = SceneConfig(objects=(1, 1))
+    scenes = [sample(config, seed, width=32, height=32) for seed in range(24)]
+    assert {scene.background.kind == "open-air" for scene in scenes} == {False, True}
+    assert all((scene.sky is not None) == (scene.background.kind == "open-air") for scene in scenes)
 
 
 @pytest.mark.parametrize(
@@ -308,6 +326,6 @@ def test_a_background_without_a_material_is_named() -> None:
             Background(
                 "room",
                 (3.0, 3.0, 2.5),
-                dict.fromkeys(("wall_east", "wall_west", "wall_north", "wall_south"), plain()),
+                dict.fromkeys(WALLS, plain()),
             )
         )

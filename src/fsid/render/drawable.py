@@ -106,11 +106,15 @@ def view_of(scene: Scene, camera_index: int) -> View:
         raise FsidError(f"camera_index {camera_index}: the scene has {len(scene.cameras)} cameras")
     for i, light in enumerate(scene.lights):
         _check_light(i, light)
+    open_air = scene.background.kind == "open-air"
     background = background_drawable(scene.background)
+    if scene.sky is not None and not open_air:
+        raise FsidError(
+            f"scene.sky: a closed '{scene.background.kind}' lets no sky in; remove it, or use kind 'open-air'"
+        )
     panels = [
         panel_drawable(light, background.materials[0]) for light in scene.lights if light.kind == "area"
     ]
-    open_air = scene.background.kind == "open-air"
     floor = 0.0 if open_air else float(background.mesh.vertices[:, 2].min())
     return View(
         drawables=(background, *_objects(scene), *panels),

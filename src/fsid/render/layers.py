@@ -53,44 +53,61 @@ class Texels:
 
 def texels_of(maps: MaterialMaps) -> Texels:
     """All mip levels of both arrays of one material."""
-    size = len(maps.height)
-    gain = maps.relief_m * size / (2 * maps.tile_m)
-    slopes = (
-        np.stack([np.roll(maps.height, -1, a) - np.roll(maps.height, 1, a) for a in (1, 0)], axis=-1) * gain
-    )
-    slope_scale = float(max(np.quantile(np.abs(slopes[::2, ::2]), 0.999), 1e-4))
-    slopes = np.clip(slopes / np.float32(slope_scale), -1.0, 1.0)
-    masks = np.stack([maps.mix, maps.pattern, maps.detail, maps.roughness, maps.metallic], axis=-1)
-    squares = (slopes**2).mean(-1)
-    levels = []
-    while True:
-        spread = np.sqrt(np.maximum(squares - (slopes**2).mean(-1), 0.0))
-        level = np.empty((2, *spread.shape, 4), np.uint8)
-        level[0] = _unorm(masks[..., :4])
-        level[0, ..., 2] = np.rint(masks[..., 2] * 254)
-        level[1, ..., :2] = np.rint(slopes * 127) + 128
-        level[1, ..., 2] = _unorm(spread)
-        level[1, ..., 3] = _unorm(masks[..., 4])
-        levels.append(level)
-        if len(spread) == 1:
-            return Texels(levels, slope_scale, _colour_shares(maps))
+    slopes = _slopes(maps)
+    slope_scale = float(max(np.quantile(np.abs(slopes[:, ::2, ::2]), 0.999), 1e-4))
+    slopes /= np.float32(slope_scale)
+    np.clip(slopes, -1.0, 1.0, out=slopes)
+    masks = np.stack([maps.mix, maps.pattern, maps.detail, maps.roughness, maps.metallic])
+    squares = _mean_square(slopes)
+    levels = [_level(masks, slopes, np.float32(0))]
+    while masks.shape[1] > 1:
         masks, slopes, squares = _halved(masks), _halved(slopes), _halved(squares)
+        levels.append(_level(masks, slopes, np.sqrt(np.maximum(squares - _mean_square(slopes), 0.0))))
+    return Texels(levels, slope_scale, _colour_shares(maps))
+
+
+def _slopes(maps: MaterialMaps) -> np.ndarray:
+    """(2, s, s) central differences of the height, which repeats, in metres per metre."""
+    height, size = maps.height, len(maps.height)
+    slopes = np.empty((2, size, size), np.float32)
+    for slope, field in ((slopes[0].T, height.T), (slopes[1], height)):
+        np.subtract(field[2:], field[:-2], out=slope[1:-1])
+        np.subtract(field[1], field[-1], out=slope[0])
+        np.subtract(field[0], field[-2], out=slope[-1])
+    slopes *= np.float32(maps.relief_m * size / (2 * maps.tile_m))
+    return slopes
+
+
+def _mean_square(slopes: np.ndarray) -> np.ndarray:
+    return (slopes[0] * slopes[0] + slopes[1] * slopes[1]) * np.float32(0.5)
+
+
+def _level(masks: np.ndarray, slopes: np.ndarray, spread: np.ndarray | np.float32) -> np.ndarray:
+    """One mip level, (2, s, s, 4) uint8, from planes (5, s, s), (2, s, s) and (s, s)."""
+    level = np.empty((2, *masks.shape[1:], 4), np.uint8)
+    for channel, top in enumerate((255, 255, 254, 255)):
+        level[0, ..., channel] = np.rint(masks[channel] * np.float32(top))
+    for channel in range(2):
+        level[1, ..., channel] = np.rint(slopes[channel] * np.float32(127)) + np.float32(128)
+    level[1, ..., 2] = np.rint(spread * np.float32(255))
+    level[1, ..., 3] = np.rint(masks[4] * np.float32(255))
+    return level
 
 
 def _colour_shares(maps: MaterialMaps) -> np.ndarray:
-    ground = 2 * maps.detail * (1 - maps.pattern)
-    shares = ((1 - maps.mix) * ground, maps.mix * ground, 2 * maps.detail * maps.pattern)
-    return np.array([s.mean(dtype=np.float64) for s in shares])
+    light = 2 * maps.detail
+    pattern = light * maps.pattern
+    light -= pattern
+    ground, pattern_share, mixed = (
+        field.mean(dtype=np.float64) for field in (light, pattern, light * maps.mix)
+    )
+    return np.array([ground - mixed, mixed, pattern_share])
 
 
-def _unorm(values: np.ndarray) -> np.ndarray:
-    return np.rint(values * 255)
-
-
-def _halved(values: np.ndarray) -> np.ndarray:
-    """2 x 2 box average of (s, s, ...)."""
-    rows = values[::2] + values[1::2]
-    return (rows[:, ::2] + rows[:, 1::2]) * np.float32(0.25)
+def _halved(planes: np.ndarray) -> np.ndarray:
+    """2 x 2 box average of (..., s, s)."""
+    rows = planes[..., ::2, :] + planes[..., 1::2, :]
+    return (rows[..., ::2] + rows[..., 1::2]) * np.float32(0.25)
 
 
 class LayerStore:
