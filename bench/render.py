@@ -5,8 +5,10 @@ scene is drawn once before it is timed, so baking and compiling are not counted;
 draws counts, because other work on the machine only ever adds. "cpu" is processor time of all threads: it
 stays true on a busy machine, and its half is what two free cores would take.
 
---fidelity compares both qualities with 4 x 4 samples per pixel (PSNR of the radiance, scaled so that its 97th
-percentile is white, at 640x360). --triangles draws one scene with meshes divided into ever more triangles.
+--fidelity compares both qualities with 4 x 4 samples per pixel (PSNR of the radiance, scaled so that its
+97th percentile is white, at 480x270). --triangles draws one scene with meshes divided into ever more
+triangles. --memory draws one default scene after the other at 1920x1080, as a worker does, and prints what
+the process holds and has held at most.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ import resource
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -37,12 +40,14 @@ def main() -> None:
     parser.add_argument("--quality", default="high", help="high or fast")
     parser.add_argument("--fidelity", action="store_true", help="compare the qualities instead")
     parser.add_argument("--triangles", action="store_true", help="cost over triangles instead")
+    parser.add_argument("--memory", action="store_true", help="memory over consecutive scenes instead")
     options = parser.parse_args()
     if options.fidelity:
         return fidelity(options)
     with open_renderer(options, options.quality) as renderer:
         print(f"{renderer.info.renderer}, OpenGL {renderer.info.version}, quality {options.quality}")
-        triangles(renderer, options) if options.triangles else frames(renderer, options)
+        measure = memory if options.memory else triangles if options.triangles else frames
+        measure(renderer, options)
     print(f"peak memory {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:,.0f} MiB")
     return None
 
@@ -77,6 +82,15 @@ def frames(renderer: Renderer, options: argparse.Namespace) -> None:
     print(f"1920x1080 costs {large / small:.2f} x 960x540 for 4 x the pixels; {faces:,.0f} triangles a scene")
 
 
+def memory(renderer: Renderer, options: argparse.Namespace) -> None:
+    """What the process holds after each of `--frames` consecutive default scenes at 1920x1080."""
+    for seed in range(options.frames):
+        renderer.render(sample(SceneConfig(), seed, width=1920, height=1080))
+        held = int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize() / 2**20
+        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+        print(f"scene {seed}: holds {held:,.0f} MiB, peak so far {peak:,.0f} MiB", flush=True)
+
+
 def triangles(renderer: Renderer, options: argparse.Namespace) -> None:
     """Processor time over the number of triangles of one scene."""
     view = view_of(scenes_of(1, *SIZES[0])[0], 0)
@@ -104,7 +118,7 @@ def divided(mesh: Mesh) -> Mesh:
 
 def fidelity(options: argparse.Namespace) -> None:
     """PSNR and processor time of both qualities against 4 x 4 samples per pixel."""
-    views = [view_of(scene, 0) for scene in scenes_of(options.frames, 640, 360)]
+    views = [view_of(scene, 0) for scene in scenes_of(options.frames, 480, 270)]
     with open_renderer(options, "high", supersampling=4) as renderer:
         references = [renderer.draw(view).radiance for view in views]
     for quality in ("high", "fast"):
@@ -113,7 +127,7 @@ def fidelity(options: argparse.Namespace) -> None:
             images = [renderer.draw(view).radiance for view in views]
         psnr = np.mean([_psnr(a, b) for a, b in zip(images, references, strict=True)])
         cpu = np.mean([row["cpu"] for row in rows])
-        print(f"{quality:>5}: {psnr:.1f} dB against 4 x 4 samples, {cpu:.3f} cpu s at 640x360")
+        print(f"{quality:>5}: {psnr:.1f} dB against 4 x 4 samples, {cpu:.3f} cpu s at 480x270")
 
 
 def _psnr(image: np.ndarray, reference: np.ndarray) -> float:

