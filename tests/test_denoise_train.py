@@ -129,9 +129,7 @@ def test_two_processes_train_one_network(data: Path, tmp_path: Path) -> None:
     assert any(not torch.equal(both[name], alone[name]) for name in both)
 
 
-def test_the_best_network_on_held_out_scenes_is_kept(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_best_network_on_held_out_scenes_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A learning rate that ends in ruin: the best network is an early one, and the last one is worse."""
 
     def ruinous(config: TrainConfig, step: int) -> float:

@@ -14,11 +14,13 @@ torch = pytest.importorskip("torch")
 from fsid.config import save_settings  # noqa: E402
 from fsid.dataset.config import DatasetConfig, GenerateConfig  # noqa: E402
 from fsid.dataset.index import index_mosaics  # noqa: E402
+from fsid.dataset.levels import LevelTable  # noqa: E402
 from fsid.dataset.loader import Batch, PatchConfig, PatchDataset, packed, window_rand  # noqa: E402
 from fsid.dataset.order import shuffled  # noqa: E402
 from fsid.dataset.shards import shard_path, write_shard  # noqa: E402
 from fsid.errors import FsidError  # noqa: E402
 from fsid.sensor import CFA_PATTERNS, NoiseLevel, Raw, add_noise, load_profile, read_raw, write_dng  # noqa: E402
+from fsid.sensor.noise import level_rand  # noqa: E402
 
 HEIGHT, WIDTH = 40, 60
 CONFIG = PatchConfig(size_px=16, batch=3, profiles=("pixel6", "galaxy-s22"), iso_min=400, iso_max=6400)
@@ -270,3 +272,20 @@ def test_validation_scenes_and_held_out_ones_are_not_drawn(dataset: Path) -> Non
     save_settings(DatasetConfig(0, 2, pairs), dataset / "config.yaml")
     assert [mosaic.scene for mosaic in index_mosaics(dataset)] == [0, 0, 1, 1]
     assert PatchDataset(dataset, replace(CONFIG, held_out=1), seed=0).mosaics == 2
+
+
+def test_the_table_of_levels_is_the_profile(rng: np.random.Generator) -> None:
+    """Log-uniform ISO, jitter as `level_rand` has it, and levels that the profile gives for that ISO."""
+    camera, count = load_profile("pixel6"), 20_000
+    drawn = LevelTable([camera], (400, 6400)).draw_rand(rng, count)
+    assert not drawn[0].any()
+    expected = [level_rand(rng, camera, (400, 6400))[1] for _ in range(2000)]
+    for found, name in zip(drawn[1:], ("k", "sigma2"), strict=True):
+        wanted = np.array([getattr(level, name) for level in expected])
+        shares = np.linspace(0.05, 0.95, 10)
+        np.testing.assert_allclose(
+            np.quantile(np.log(found), shares, axis=0), np.quantile(np.log(wanted), shares, axis=0), atol=0.2
+        )
+    calm = LevelTable([camera], (1000, 1000)).draw_rand(rng, count)
+    np.testing.assert_allclose(np.median(calm[1], axis=0), camera.level(1000).k, rtol=5e-3)
+    np.testing.assert_allclose(np.median(calm[2], axis=0), camera.level(1000).sigma2, rtol=1e-2)

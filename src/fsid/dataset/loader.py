@@ -37,12 +37,12 @@ from torch import Tensor
 from torch.utils.data import Dataset
 
 from fsid.dataset.index import StoredMosaic, index_mosaics
+from fsid.dataset.levels import LevelTable
 from fsid.dataset.order import mixed, shuffled
 from fsid.errors import FsidError
 from fsid.sensor.formula import stored, with_noise
 from fsid.sensor.gaussian import standard_normal
 from fsid.sensor.mosaic import site_offsets
-from fsid.sensor.noise import level_rand
 from fsid.sensor.profiles import CameraProfile, load_profile
 from fsid.sensor.quantise import ROUNDING_DN2
 from fsid.sensor.raw import NoiseLevel
@@ -101,8 +101,9 @@ class PatchDataset(Dataset[Batch]):
         self._mosaics = _training_mosaics(data_dir, config)
         self._noisy = _noisy_of(data_dir, self._mosaics) if config.noise == "stored" else {}
         self._profiles = [load_profile(name) for name in config.profiles]
+        self._levels = LevelTable(self._profiles, (config.iso_min, config.iso_max))
         self._config, self._seed = config, seed
-        self._maps: OrderedDict[Path, np.memmap] = OrderedDict()
+        self._maps: OrderedDict[Path, np.ndarray] = OrderedDict()
         self._pitch = (
             2 * config.size_px + 2
         )  # one tile more than the patch, for the shift of a mirrored window
@@ -130,23 +131,23 @@ class PatchDataset(Dataset[Batch]):
         config = self._config
         rng = np.random.default_rng([self._seed, step, self._rank])
         shape = (config.batch, 4, config.size_px, config.size_px)
-        noisy, clean = np.empty(shape, np.float32), np.empty(shape, np.float32)
-        k, sigma2 = np.empty((config.batch, 4), np.float32), np.empty((config.batch, 4), np.float32)
+        batch = Batch(*(_shared_empty(size) for size in (shape, shape, shape[:2], shape[:2])))
+        noisy, clean, k, sigma2 = (t.numpy() for t in (batch.noisy, batch.clean, batch.k, batch.sigma2))
+        if config.noise == "fresh":
+            cameras, k[:], sigma2[:] = self._levels.draw_rand(rng, config.batch)
         first = (step * self._world + self._rank) * config.batch
         for slot in range(config.batch):
             mosaic, corner = self._patch_at(first + slot)
             cut, is_transposed = window_rand(rng, mosaic, corner, config.size_px)
             packed(self._pixels(mosaic), mosaic, cut, clean[slot])
             if config.noise == "fresh":
-                camera = self._profiles[rng.integers(len(self._profiles))]
-                level = level_rand(rng, camera, (config.iso_min, config.iso_max))[1]
-                noisy[slot] = _exposed(rng, clean[slot], level, camera)
+                noisy[slot] = _exposed(rng, clean[slot], k[slot], sigma2[slot], self._profiles[cameras[slot]])
             else:
                 capture, level = self._noisy[mosaic.key]
                 packed(self._pixels(capture), capture, cut, noisy[slot])
                 level = _transposed(level) if is_transposed else level
-            k[slot], sigma2[slot] = level.k, level.sigma2
-        return Batch(*map(torch.from_numpy, (noisy, clean, k, sigma2)))
+                k[slot], sigma2[slot] = level.k, level.sigma2
+        return batch
 
     def _patch_at(self, position: int) -> tuple[StoredMosaic, tuple[int, int]]:
         """Which patch comes at a position of the whole training: mosaic and top left corner of its cell."""
@@ -169,7 +170,7 @@ class PatchDataset(Dataset[Batch]):
         if mosaic.shard not in self._maps:
             if len(self._maps) == _OPEN_MAPS:
                 self._maps.popitem(last=False)
-            self._maps[mosaic.shard] = np.memmap(mosaic.shard, np.uint8, mode="r")
+            self._maps[mosaic.shard] = np.memmap(mosaic.shard, np.uint8, mode="r").view(np.ndarray)
         end = mosaic.offset + 2 * mosaic.height * mosaic.width
         pixels = self._maps[mosaic.shard][mosaic.offset : end].view("<u2")
         return pixels.reshape(mosaic.height, mosaic.width)
@@ -187,8 +188,9 @@ def window_rand(
     The cut (2 size_px, 2 size_px) is placed in the cell so that its first pixel is R and its tile RGGB.
     """
     slices = []
-    for start, red in zip(corner, site_offsets(mosaic.cfa)[0], strict=True):
-        is_mirrored = int(rng.integers(2))
+    chance = int(rng.integers(8))
+    for axis, (start, red) in enumerate(zip(corner, site_offsets(mosaic.cfa)[0], strict=True)):
+        is_mirrored = chance >> axis & 1
         start += (start + red + is_mirrored) % 2
         stop = start + 2 * size_px
         if is_mirrored:
@@ -196,28 +198,34 @@ def window_rand(
         else:
             slices.append(slice(start, stop))
     rows, columns = slices
-    if rng.integers(2):
+    if chance & 4:
         return lambda pixels: pixels[rows, columns].T, True
     return lambda pixels: pixels[rows, columns], False
 
 
 def packed(pixels: np.ndarray, mosaic: StoredMosaic, cut: Cut, out: np.ndarray) -> None:
     """The RGGB cut of DN `pixels` (H, W) as x, into `out` (4, size_px, size_px)."""
-    window = np.ascontiguousarray(cut(pixels))
-    for plane, (r, c) in zip(out, site_offsets("RGGB"), strict=True):
-        plane[:] = window[r::2, c::2]
+    size_px = out.shape[1]
+    window = np.ascontiguousarray(cut(pixels)).reshape(size_px, 2, size_px, 2)
+    out.reshape(2, 2, size_px, size_px)[:] = window.transpose(1, 3, 0, 2)
     out -= mosaic.black_level
     out *= np.float32(1 / (mosaic.white_level - mosaic.black_level))
 
 
 def _exposed(
-    rng: np.random.Generator, clean: np.ndarray, level: NoiseLevel, camera: CameraProfile
+    rng: np.random.Generator, clean: np.ndarray, k: np.ndarray, sigma2: np.ndarray, camera: CameraProfile
 ) -> np.ndarray:
-    """`noisy_from_clean(...)` of the sensor, for one packed patch."""
-    k = np.array(level.k, np.float32)[:, None, None]
-    injected = np.array(level.sigma2, np.float32)[:, None, None] - np.float32(ROUNDING_DN2 / camera.span**2)
-    noisy = with_noise(clean, standard_normal(rng, clean.shape), k, injected.clip(min=0))
+    """`noisy_from_clean(...)` of the sensor, for one packed patch; k, sigma2 (4,) float32."""
+    injected = sigma2 - np.float32(ROUNDING_DN2 / camera.span**2)
+    normal = standard_normal(rng, clean.shape)
+    noisy = with_noise(clean, normal, k[:, None, None], injected.clip(min=0)[:, None, None])
     return stored(noisy, camera.black_level, camera.span)
+
+
+def _shared_empty(shape: tuple[int, ...]) -> Tensor:
+    """(shape) float32; in a loading process where the training finds it, so that nothing is copied."""
+    values = torch.empty(shape)
+    return values.share_memory_() if torch.utils.data.get_worker_info() is not None else values
 
 
 def _transposed(level: NoiseLevel) -> NoiseLevel:
