@@ -77,6 +77,8 @@ CASES = [
     ("testset photos {0}/none -o {0}/out", "none"),
     ("testset photos {0}/empty -o {0}/out --camera nokia", "nokia"),
     ("evaluate {0}/empty", "testset.json"),
+    ("inspect {0}/none", "none"),
+    ("experiment ablation -o {0}/out --count 0", "--count"),
     ("evaluate {0}/empty --model {0}/none", "empty"),
     ("demo -o {0}/out --photographs 99", "--photographs"),
     ("demo -o {0}/out --width 31", "width"),
