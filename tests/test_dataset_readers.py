@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import io
+from collections import Counter
 from pathlib import Path
 
+import numpy as np
 import pytest
 import rawpy
 from PIL import Image
 
 from fsid.config import load_settings
 from fsid.dataset import GenerateConfig, generate, shard_path
+from fsid.dataset.card import _sources, _Tally
+from fsid.dataset.inspect import inspect
+from fsid.dataset.statistics import TITLES
 
 SETTINGS = ["width=64", "height=48", "texture_size=64", "supersampling=1", "scene.objects=[1,3]"]
 
@@ -86,3 +91,30 @@ def test_a_card_is_written_when_all_is_there_and_only_then(data: Path) -> None:
     generate(data, same, count=6, seed=2, shard_size=4, command="fsid generate data --count 6")
     assert shard.read_bytes() == stored
     assert {name: (data / name).read_bytes() for name in before} == before
+
+
+def test_the_card_states_what_inspect_measures(tmp_path: Path, rng: np.random.Generator) -> None:
+    pictures = tmp_path / "pictures"
+    pictures.mkdir()
+    for i in range(2):
+        Image.fromarray(rng.integers(0, 255, (320, 320, 3), np.uint8)).save(pictures / f"{i}.png")
+    generate(tmp_path / "data", GenerateConfig(images=str(pictures), width=144, height=144), count=2)
+    card = (tmp_path / "data" / "README.md").read_text()
+    measured = inspect(tmp_path / "data").values
+    assert "Means over 2 of the clean images" in card
+    for name, title in TITLES.items():
+        assert f"| {title} | {measured[name].mean():.3g} |" in card
+
+
+def test_licences_of_meshes_are_counted_by_use(tmp_path: Path) -> None:
+    import trimesh
+
+    folders = [tmp_path / name for name in ("a", "b")]
+    for folder in folders:
+        folder.mkdir()
+        trimesh.creation.box((0.3, 0.2, 0.1)).export(folder / "box.glb")
+    (folders[0] / "LICENSE.txt").write_text("CC0 1.0 Universal\n")
+    used = Counter({f"file:{folder / 'box.glb'}": n for folder, n in zip(folders, (3, 2), strict=True)})
+    stated, unknown = _sources(_Tally({"mesh": used}))
+    assert "3 uses. Licences: CC0 (3) uses." in stated
+    assert "2 uses. No licence file was found" in unknown

@@ -1,7 +1,8 @@
-"""The dataset card: README.md beside the shards of a finished dataset, from its records alone.
+"""The dataset card: README.md beside the shards of a finished dataset, from its records and images.
 
-What is in it, from what it was made and under which licences, how often the checks refused a frame, and the
-command that makes it again. No clock and no machine: the same dataset has the same card.
+What is in it, from what it was made and under which licences, how often the checks refused a frame, what
+`fsid inspect` measures on some of it, and the command that makes it again. No clock and no machine: the same
+dataset has the same card.
 """
 
 from __future__ import annotations
@@ -18,7 +19,9 @@ import numpy as np
 from PIL import Image
 
 from fsid import __version__
+from fsid.assets.sources import survey_meshes
 from fsid.dataset.config import DatasetConfig
+from fsid.dataset.index import index_mosaics
 from fsid.dataset.picture import grid
 from fsid.dataset.shards import read_member, read_records, shard_keys
 from fsid.files import write_atomically
@@ -26,6 +29,9 @@ from fsid.files import write_atomically
 CARD, SHEET = "README.md", "samples.png"
 _TILES, _TILE_PX = 12, 240
 _FAMILIES_SHOWN = 200
+_MEASURED = 64
+"""Images whose statistics the card states; `fsid inspect` measures more."""
+_SMALLEST_PX = 128
 
 
 @dataclass
@@ -71,10 +77,10 @@ def write_card(out: Path, dataset: DatasetConfig, shards: Sequence[Path], comman
         for record in read_records(shard):
             tally.add(record)
     write_atomically(out / SHEET, _sheet(shards))
-    write_atomically(out / CARD, _text(dataset, tally, command).encode())
+    write_atomically(out / CARD, _text(dataset, tally, list(_statistics(out)), command).encode())
 
 
-def _text(dataset: DatasetConfig, tally: _Tally, command: str) -> str:
+def _text(dataset: DatasetConfig, tally: _Tally, statistics: Sequence[str], command: str) -> str:
     config = dataset.generate
     splits, refused = tally.counts["split"], tally.counts.get("refused", Counter())
     drawn = len(tally.frames) + refused.total()
@@ -101,6 +107,7 @@ def _text(dataset: DatasetConfig, tally: _Tally, command: str) -> str:
         "## Sources and licences",
         "",
         *_sources(tally),
+        *statistics,
     ]
     if command:
         lines += ["", "## Made with", "", "```sh", command, "```"]
@@ -115,10 +122,23 @@ def _sources(tally: _Tally) -> Iterable[str]:
         if own:
             yield f"- FSID's own {name} (Apache-2.0, made by formula): {_listed(own, 'uses')}."
         for folder, n in sorted(Counter(_folder(key) for key in (used - own).elements()).items()):
-            yield f"- {name} from `{folder}`: {n} uses. {_licence(Path(folder))}"
+            yield f"- {name} from `{folder}`: {n} uses. {_licence(what, Path(folder), used)}"
     pictures = tally.counts.get("picture", Counter())
     if pictures:
         yield f"- {len(pictures)} pictures that the maker of this dataset supplied, under their own licences."
+
+
+def _statistics(out: Path) -> Iterable[str]:
+    """Means of what `fsid inspect` measures; nothing where an image is too small for it."""
+    from fsid.dataset.inspect import inspect  # with libraries that a worker never needs
+    from fsid.dataset.statistics import TITLES
+
+    if min(min(mosaic.height, mosaic.width) for mosaic in index_mosaics(out)) < _SMALLEST_PX:
+        return
+    found = inspect(out, limit=_MEASURED)
+    yield from ("", "## Statistics", "", f"Means over {found.pictures} of the clean images (`fsid inspect`).")
+    yield from ("", "| | mean |", "|---|---|")
+    yield from (f"| {TITLES[name]} | {values.mean():.3g} |" for name, values in found.values.items())
 
 
 def _folder(source: str) -> str:
@@ -127,8 +147,19 @@ def _folder(source: str) -> str:
     return path if member else str(Path(path).parent)
 
 
-def _licence(folder: Path) -> str:
-    """What the folder says of its licence: the first line of a licence file in it or above it."""
+def _licence(what: str, place: Path, used: Counter[str]) -> str:
+    """The licences of the meshes that were used, by their library or nearest file; else the folder's."""
+    if what == "mesh" and place.exists():
+        licences = {source.name: source.licence for source in survey_meshes(str(place)).usable}
+        stated = Counter({name: n for name, n in used.items() if licences.get(name)})
+        by_licence = Counter(licences[name] for name in stated.elements())
+        if by_licence:
+            return f"Licences: {_listed(by_licence, 'uses')}."
+    return _folder_licence(place)
+
+
+def _folder_licence(folder: Path) -> str:
+    """What a folder says of its licence: the first line of a licence file in it or above it."""
     for place in (folder, folder.parent):
         if place.is_dir():
             for file in sorted(place.iterdir()):
