@@ -45,7 +45,7 @@ class PlacementConfig:
 class MaterialConfig:
     """M: how baked families are coloured and finished."""
 
-    plain_share: float = knob(0.24, 0.0, 1.0)
+    plain_share: float = knob(0.17, 0.0, 1.0)
     """Share of surfaces in plain paint: homogeneous areas exist in reality too."""
     tile_scale: Range = knob((0.25, 1.2), 0.01, 100.0)
     """Texture tile width on objects relative to the natural width of its family; log-uniform."""
@@ -90,7 +90,7 @@ class BackgroundConfig:
     """Height of the hills towards the horizon."""
     pool_share: float = knob(0.7, 0.0, 1.0)
     """Share of surfaces whose material comes from the pool of their sort (`fsid.scene.pools`)."""
-    plain_share: float = knob(0.4, 0.0, 1.0)
+    plain_share: float = knob(0.3, 0.0, 1.0)
     """Share of walls, ceilings and backdrops in plain paint."""
     tile_scale: Range = knob((0.5, 1.6), 0.01, 100.0)
     """Texture tile width on backgrounds relative to the natural width of its family; log-uniform."""
