@@ -49,6 +49,8 @@ def test_every_knob_is_in_the_guide_with_its_default(group, key, default):
     if isinstance(default, tuple):
         numbers = [float(x) for x in re.findall(r"[-\d.]+", stated)]
         assert numbers == pytest.approx(list(default))
+    elif isinstance(default, bool):
+        assert stated == str(default).lower()
     elif isinstance(default, str):
         assert stated == (default or "none")
     else:

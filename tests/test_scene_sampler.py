@@ -5,6 +5,7 @@ import time
 
 import numpy as np
 import pytest
+import trimesh
 
 from fsid.assets import BACKGROUND_PARTS, build_mesh, material_families, mesh_families, registry
 from fsid.assets.solids import box, rotation_matrix
@@ -354,3 +355,12 @@ def test_a_narrow_choice_of_families_is_obeyed():
     s = scene(2, config=config)
     assert {o.family for o in s.objects} == {"vase", "stool"}
     assert {m.family for ms in s.materials for m in ms} == {"brick"}
+
+
+def test_meshes_of_unknown_licence_can_be_left_out(tmp_path):
+    """A folder without a licence file holds nothing that is stated to be in the public domain."""
+    trimesh.creation.box().export(tmp_path / "box.ply")
+    config = SceneConfig(mesh_folders=(str(tmp_path),), mesh_folder_share=1.0)
+    assert all(o.family.startswith("file:") for o in sample(config, 1, width=64, height=64).objects)
+    with pytest.raises(FsidError):
+        sample(dataclasses.replace(config, mesh_folders_cc0_only=True), 1, width=64, height=64)

@@ -150,6 +150,8 @@ class SceneConfig:
     """Material families to draw from; empty = all."""
     mesh_folders: tuple[str, ...] = ()
     """Folders of meshes (.glb .gltf .obj .ply .stl) and furniture libraries (.sh3f)."""
+    mesh_folders_cc0_only: bool = False
+    """Whether to leave out meshes that are not stated to be in the public domain (CC0)."""
     mesh_folder_share: float = knob(0.5, 0.0, 1.0)
     """Share of objects from these folders, if there are any."""
     texture_folders: tuple[str, ...] = ()

@@ -25,7 +25,8 @@ Names = tuple[str, ...]
 def mesh_rand(rng: np.random.Generator, config: SceneConfig) -> str:
     """A name for `Object.family`."""
     families = config.mesh_families or mesh_families()
-    return _rand(rng, families, config.mesh_folders, config.mesh_folder_share, mesh_sources)
+    find = _free_meshes if config.mesh_folders_cc0_only else mesh_sources
+    return _rand(rng, families, config.mesh_folders, config.mesh_folder_share, find)
 
 
 def texture_rand(rng: np.random.Generator, config: SceneConfig) -> str:
@@ -60,6 +61,10 @@ def _catalogue(folders: Names, find: Callable[[str], Names]) -> tuple[Names, Nam
     ]
     names, labels = zip(*found, strict=True)
     return names, labels
+
+
+def _free_meshes(folder: str) -> Names:
+    return mesh_sources(folder, cc0_only=True)
 
 
 def _skies(folder: str) -> Names:

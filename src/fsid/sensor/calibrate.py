@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
 from fsid.errors import FsidError
 from fsid.sensor.quantise import ROUNDING_DN2
@@ -218,7 +218,8 @@ def _sound(
 
 def _largest(frames: int) -> float:
     """The largest variance that Gaussian noise shows, in medians."""
-    return float(chi2.ppf(1 - OUTLIER_PROBABILITY, frames - 1) / chi2.median(frames - 1))
+    half = (frames - 1) / 2  # quantiles of chi-square with frames - 1 degrees of freedom
+    return float(gammaincinv(half, 1 - OUTLIER_PROBABILITY) / gammaincinv(half, 0.5))
 
 
 def _line(samples: Samples) -> tuple[float, float, float, float]:
