@@ -19,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fsid.assets.bake_cache import cache_folder
 from fsid.assets.mesh import Mesh
 from fsid.assets.sources.limits import RefusedError
 
@@ -55,7 +56,7 @@ def measures(mesh: Mesh) -> np.ndarray:
 
 
 def _load(key: str, names: tuple[str, ...]) -> list[np.ndarray] | None:
-    folder = _folder()
+    folder = cache_folder("meshes")
     if folder is None:
         return None
     try:
@@ -92,7 +93,7 @@ def store_refusal(key: str, reason: str) -> None:
 
 def _replace(name: str, data: bytes) -> None:
     """A whole file under its name at once, or nothing at all; every process writes one of its own."""
-    folder = _folder()
+    folder = cache_folder("meshes")
     if folder is None:
         return
     part = folder / f"{name}.{os.getpid()}.part"
@@ -103,11 +104,3 @@ def _replace(name: str, data: bytes) -> None:
     except OSError:
         with contextlib.suppress(OSError):
             part.unlink(missing_ok=True)
-
-
-def _folder() -> Path | None:
-    chosen = os.environ.get("FSID_CACHE", "")
-    if chosen.lower() == "off":
-        return None
-    home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    return Path(chosen or f"{home}/fsid") / "meshes"
