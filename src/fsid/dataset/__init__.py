@@ -7,6 +7,7 @@ from fsid.dataset.generate import Workforce, generate
 from fsid.dataset.only import make_only
 from fsid.dataset.photos import find_photos, read_photo
 from fsid.dataset.picture import check_png, contact_sheet, grid, save_png
+from fsid.dataset.pictures import find_pictures
 from fsid.dataset.sample import encode, make_frame, make_sample, remake, scene_of, to_uint8
 from fsid.dataset.shards import find_shards, read_member, shard_keys, shard_path, write_shard
 
@@ -21,6 +22,7 @@ __all__ = [
     "encode",
     "estimate",
     "find_photos",
+    "find_pictures",
     "find_shards",
     "generate",
     "generate_config",

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Literal
 
 from fsid.config import from_plain, load_settings, read_yaml, save_settings, to_plain
-from fsid.dataset import GenerateConfig, generate
+from fsid.dataset import GenerateConfig, find_pictures, generate
 from fsid.denoise import train, train_config
 from fsid.errors import FsidError
 from fsid.evaluate.compare import (
@@ -54,10 +54,11 @@ TEST_ISOS = (800, 1600, 3200, 6400)
 class ExperimentConfig:
     """One experiment: with its folder of photographs, everything that its result depends on.
 
-    count: pairs per source, width x height pixels each (photographs: as much of it as they have). steps: of
-    every training, 0 takes those of the configuration `network` (a built-in name or a YAML file). seeds: one
-    training per source and seed. photos: folder to train the real rival on. tests: folders of photographs to
-    measure on, beside the simulated materials (materials_scenes pictures of each, test_width x test_height).
+    count: pairs per source, width x height pixels each (photographs: at least every one of the folder, as
+    large as it is). steps: of every training, 0 takes those of the configuration `network` (a built-in name
+    or a YAML file). seeds: one training per source and seed. photos: folder to train the real rival on. tests:
+    folders of photographs to measure on, beside the simulated materials (materials_scenes pictures of each,
+    test_width x test_height).
     settings: `key=value` of the generator, for every source of scenes.
     """
 
@@ -158,19 +159,21 @@ def _claim(out: Path, config: ExperimentConfig) -> None:
 def _data(out: Path, config: ExperimentConfig, source: str, bar: ProgressBar, workers: int) -> Path:
     """The training pairs of a source."""
     data = out / "data" / source
-    seed = config.seeds[0]
+    seed, count = config.seeds[0], config.count
     overrides = [f"width={config.width}", f"height={config.height}", f"cameras=[{config.camera}]"]
     if source in VARIANTS:
         overrides += [f"variant={source}", *config.settings]
     elif source == PHOTOGRAPHS:
-        overrides.append(f"images={Path(config.photos).resolve()}")
+        photos = Path(config.photos).resolve()
+        overrides.append(f"images={photos}")
+        count = max(count, len(find_pictures(photos)))
     else:
         pictures = out / "dead-leaves"
         write_dead_leaves(pictures, config.count, height=config.height, width=config.width, seed=seed)
         overrides.append(f"images={pictures.resolve()}")
     settings = load_settings(GenerateConfig, None, overrides)
     with bar(f"pairs from {source}", "pairs") as progress:
-        generate(data, settings, count=config.count, seed=seed, workers=workers, progress=progress)
+        generate(data, settings, count=count, seed=seed, workers=workers, progress=progress)
     return data
 
 
