@@ -56,9 +56,9 @@ class ExperimentConfig:
 
     count: pairs per source, width x height pixels each (photographs: at least every one of the folder, as
     large as it is). steps: of every training, 0 takes those of the configuration `network` (a built-in name
-    or a YAML file). seeds: one training per source and seed. photos: folder to train the real rival on. tests:
-    folders of photographs to measure on, beside the simulated materials (materials_scenes pictures of each,
-    test_width x test_height).
+    or a YAML file). seeds: one training per source and seed. photos: folder to train the real rival on.
+    tests: folders of photographs to measure on, beside the simulated materials (materials_scenes pictures of
+    each, test_width x test_height).
     settings: `key=value` of the generator, for every source of scenes.
     """
 
