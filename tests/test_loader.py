@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,6 +14,7 @@ torch = pytest.importorskip("torch")
 
 from fsid.config import save_settings  # noqa: E402
 from fsid.dataset.config import DatasetConfig, GenerateConfig  # noqa: E402
+from fsid.dataset.feed import batches  # noqa: E402
 from fsid.dataset.index import index_mosaics  # noqa: E402
 from fsid.dataset.levels import LevelTable  # noqa: E402
 from fsid.dataset.loader import Batch, PatchConfig, PatchDataset, packed, window_rand  # noqa: E402
@@ -146,12 +148,17 @@ def test_a_batch_depends_on_seed_and_step_alone(dataset: Path) -> None:
     assert not any(equal(patches[7], other) for other in others)
 
 
-def test_loading_processes_change_nothing(dataset: Path) -> None:
-    patches = PatchDataset(dataset, CONFIG, seed=3)
+@pytest.mark.parametrize("processes", [0, 1, 2])
+def test_loading_processes_change_nothing(processes: int, dataset: Path) -> None:
+    """Slow as this consumer is, no process writes into the batch that it holds; memory is used again."""
+    patches, steps = PatchDataset(dataset, CONFIG, seed=3), range(2, 22)
     patches[0]
-    loader = torch.utils.data.DataLoader(patches, batch_size=None, sampler=range(2, 5), num_workers=1)
-    for step, batch in zip(range(2, 5), loader, strict=True):
+    places = set()
+    for step, batch in zip(steps, batches(patches, steps, processes), strict=True):
+        time.sleep(0.02)
         assert equal(batch, patches[step])
+        places.add(batch.noisy.data_ptr())
+    assert not processes or len(places) == 2 * processes + 1
 
 
 def test_unusable_datasets_are_named(dataset: Path, tmp_path: Path) -> None:

@@ -86,8 +86,8 @@ class PatchConfig:
 class PatchDataset(Dataset[Batch]):
     """`dataset[step]` is the batch of that step; see the module docstring. Validation scenes are left out.
 
-    Feed it to a `DataLoader` with `batch_size=None` and `sampler=range(first_step, steps)`.
-    rank, world: this process among those that train together; world None asks `torch.distributed`.
+    `feed.batches` has other processes make them. rank, world: this process among those that train together;
+    world None asks `torch.distributed`.
     """
 
     def __init__(
@@ -127,11 +127,20 @@ class PatchDataset(Dataset[Batch]):
         """How many patches an epoch has, all ranks together."""
         return int(self._ends[-1])
 
+    def empty_batch(self) -> Batch:
+        """Memory for a batch, not filled yet."""
+        shape = (self._config.batch, 4, self._config.size_px, self._config.size_px)
+        return Batch(*(torch.empty(size) for size in (shape, shape, shape[:2], shape[:2])))
+
     def __getitem__(self, step: int) -> Batch:
+        batch = self.empty_batch()
+        self.fill(batch, step)
+        return batch
+
+    def fill(self, batch: Batch, step: int) -> None:
+        """Make the batch of a step in the memory of `batch`."""
         config = self._config
         rng = np.random.default_rng([self._seed, step, self._rank])
-        shape = (config.batch, 4, config.size_px, config.size_px)
-        batch = Batch(*(_shared_empty(size) for size in (shape, shape, shape[:2], shape[:2])))
         noisy, clean, k, sigma2 = (t.numpy() for t in (batch.noisy, batch.clean, batch.k, batch.sigma2))
         if config.noise == "fresh":
             cameras, k[:], sigma2[:] = self._levels.draw_rand(rng, config.batch)
@@ -147,7 +156,6 @@ class PatchDataset(Dataset[Batch]):
                 packed(self._pixels(capture), capture, cut, noisy[slot])
                 level = _transposed(level) if is_transposed else level
                 k[slot], sigma2[slot] = level.k, level.sigma2
-        return batch
 
     def _patch_at(self, position: int) -> tuple[StoredMosaic, tuple[int, int]]:
         """Which patch comes at a position of the whole training: mosaic and top left corner of its cell."""
@@ -220,12 +228,6 @@ def _exposed(
     normal = standard_normal(rng, clean.shape)
     noisy = with_noise(clean, normal, k[:, None, None], injected.clip(min=0)[:, None, None])
     return stored(noisy, camera.black_level, camera.span)
-
-
-def _shared_empty(shape: tuple[int, ...]) -> Tensor:
-    """(shape) float32; in a loading process where the training finds it, so that nothing is copied."""
-    values = torch.empty(shape)
-    return values.share_memory_() if torch.utils.data.get_worker_info() is not None else values
 
 
 def _transposed(level: NoiseLevel) -> NoiseLevel:

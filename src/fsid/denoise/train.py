@@ -23,9 +23,9 @@ import numpy as np
 import torch
 from accelerate import Accelerator
 from torch import Tensor
-from torch.utils.data import DataLoader
 
 from fsid.config import load_settings, read_yaml, save_settings, to_plain
+from fsid.dataset.feed import batches
 from fsid.dataset.loader import Batch, PatchConfig, PatchDataset
 from fsid.denoise.board import Board
 from fsid.denoise.checkpoint import TrainState, load_checkpoint, save_checkpoint
@@ -77,17 +77,11 @@ def train(
     bare = accelerator.unwrap_model(net)
     state = load_checkpoint(run_dir, bare, optimizer)
     forward = torch.compile(net) if _compiles(config) else net
-    loader = DataLoader(
-        patches,
-        batch_size=None,
-        sampler=range(state.step, config.steps),
-        num_workers=config.loader_processes,
-        pin_memory=gpu,
-    )
+    feed = batches(patches, range(state.step, config.steps), config.loader_processes, pin=gpu)
     shown = is_main and not quiet and progress is None
     with LiveLine(config, state.step, accelerator.num_processes, quiet=not shown) as live:
         keeper = _Keeper(data_dir, run_dir, config, accelerator, patches.mosaics, command, state, live)
-        for batch in loader:
+        for batch in feed:
             rate = learning_rate(config, state.step)
             loss, psnr = _step(accelerator, forward, net, optimizer, batch, rate, config)
             state.advance(bare, config.ema_decay)

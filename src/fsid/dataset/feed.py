@@ -1,0 +1,60 @@
+"""Batches that other processes make, in shared memory that is used again and again.
+
+    slot of the i-th batch = i mod R,      R = batches asked for ahead + the one that is in use
+
+A page of fresh shared memory costs a fault and a clearing, for batches of patches more than what is computed
+into it. So the slots are made once, before the processes that fill them; what travels through the queue is
+the number of a step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from torch import Tensor
+from torch.utils.data import DataLoader, Dataset
+
+from fsid.dataset.loader import Batch, PatchDataset
+
+_AHEAD = 2  # batches that each process is asked for beyond the one in use
+
+
+def batches(patches: PatchDataset, steps: range, processes: int = 0, *, pin: bool = False) -> Iterator[Batch]:
+    """`patches[step]` for all `steps`, made by so many other processes; 0: here.
+
+    A batch is valid until the next one is asked for; copy what is to be kept. pin: into page-locked memory,
+    from which a GPU copies faster.
+    """
+    if not processes:
+        made = (patches[step] for step in steps)
+    else:
+        ring = [_shared(patches.empty_batch()) for _ in range(_AHEAD * processes + 1)]
+        slots = DataLoader(
+            _Slots(patches, steps, ring), batch_size=None, num_workers=processes, prefetch_factor=_AHEAD
+        )
+        made = (ring[slot] for slot in slots)
+    for batch in made:
+        yield Batch(*(tensor.pin_memory() for tensor in _tensors(batch))) if pin else batch
+
+
+class _Slots(Dataset[int]):
+    """`slots[i]` fills the slot of the i-th step and says which one it is."""
+
+    def __init__(self, patches: PatchDataset, steps: range, ring: list[Batch]) -> None:
+        self._patches, self._steps, self._ring = patches, steps, ring
+
+    def __len__(self) -> int:
+        return len(self._steps)
+
+    def __getitem__(self, place: int) -> int:
+        slot = place % len(self._ring)
+        self._patches.fill(self._ring[slot], self._steps[place])
+        return slot
+
+
+def _shared(batch: Batch) -> Batch:
+    return Batch(*(tensor.share_memory_() for tensor in _tensors(batch)))
+
+
+def _tensors(batch: Batch) -> tuple[Tensor, ...]:
+    return batch.noisy, batch.clean, batch.k, batch.sigma2
