@@ -6,18 +6,19 @@ import numpy as np
 
 from fsid.assets import MaterialMaps, Mesh, build_background
 from fsid.render.drawable import Drawable, View
+from fsid.render.texels import Texels, texels_of
 from fsid.scene.model import Camera, Light, Material, Transform, Vec3
 
 STILL = Transform((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
 FROM_ABOVE = Camera((0.0, 0.0, 2.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 60.0, 96, 96)
 
 
-def bake_plain(family: str, variant: int, size: int) -> MaterialMaps:
+def bake_plain(family: str, variant: int, size: int) -> Texels:
     """Flat maps: `family` is "plain" (rough) or "metal"; the variant is the roughness in per cent."""
     constant = {"mix": 0.0, "pattern": 0.0, "detail": 0.5, "roughness": variant / 100, "height": 0.5}
     maps = {name: np.full((size, size), value, np.float32) for name, value in constant.items()}
     metallic = np.full((size, size), float(family == "metal"), np.float32)
-    return MaterialMaps(**maps, metallic=metallic, relief_m=0.001, tile_m=1.0)
+    return texels_of(MaterialMaps(**maps, metallic=metallic, relief_m=0.001, tile_m=1.0))
 
 
 def plain(colour: Vec3 = (0.5, 0.5, 0.5), *, roughness: int = 100, family: str = "plain") -> Material:

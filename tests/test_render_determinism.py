@@ -6,14 +6,17 @@ import hashlib
 import subprocess
 import sys
 from collections.abc import Iterator
+from ctypes import c_int, c_uint, c_void_p
 
 import numpy as np
 import pytest
 
-from fsid.assets import MATERIAL_VARIANTS, bake_material, material_families
+from fsid.assets import MATERIAL_VARIANTS, material_families
 from fsid.errors import FsidError
 from fsid.render import Frame, Renderer
 from fsid.render.layers import LayerStore
+from fsid.render.texels import bake_texels, level_ranges
+from fsid.render.texture_array import TextureArray, gl
 from fsid.scene import LightConfig, Scene, SceneConfig, sample
 
 CONFIG = SceneConfig(objects=(6, 8))
@@ -73,7 +76,7 @@ def test_layers_leave_in_order_of_last_use(renderer: Renderer) -> None:
 
     def bake(family: str, variant: int, size: int):
         baked.append((family, variant))
-        return bake_material("paint", 0, size)
+        return bake_texels("paint", 0, size)
 
     for name in ("a", "b", "c", "d", "a", "e"):
         store.load([(name, 0)], bake)
@@ -84,17 +87,33 @@ def test_layers_leave_in_order_of_last_use(renderer: Renderer) -> None:
     assert sorted(layer.index for layer in layers.values()) == list(range(9))
 
 
+def resident(array: TextureArray, level: int, size: int) -> np.ndarray:
+    """(layers, size, size, 4) uint8: a mip level of a texture array."""
+    texels = np.empty((array.capacity, size, size, 4), np.uint8)
+    array.use(0)
+    gl("glGetTexImage", c_uint, c_int, c_uint, c_uint, c_void_p)(
+        0x8C1A, level, 0x1908, 0x1401, texels.ctypes.data
+    )
+    return texels
+
+
 def test_a_stored_layer_is_what_was_baked(renderer: Renderer) -> None:
     """Every mip level of every resident layer survives growth of the arrays."""
     store = LayerStore(renderer._context, 64)
     families = [(family, v) for family in material_families()[:6] for v in range(MATERIAL_VARIANTS)]
     for i in range(1, len(families) + 1):
-        layers = store.load(families[:i], bake_material)
-    masks = np.frombuffer(store._arrays[0].read(), np.uint8).reshape(-1, 64, 64, 4)
-    for key, layer in layers.items():
-        expected = bake_material(*key, 64)
-        np.testing.assert_allclose(masks[layer.index, ..., 0] / 255, expected.mix, atol=0.003)
-        np.testing.assert_allclose(masks[layer.index, ..., 3] / 255, expected.roughness, atol=0.003)
+        layers = store.load(families[:i], bake_texels)
+    for level, (size, texels) in enumerate(level_ranges(64)):
+        for half, array in enumerate(store._arrays):
+            found = resident(array, level, size)
+            for key, layer in layers.items():
+                expected = bake_texels(*key, 64).data[half, texels].reshape(size, size, 4)
+                np.testing.assert_array_equal(found[layer.index], expected)
+
+
+def test_too_little_texture_memory_is_said(renderer: Renderer) -> None:
+    with pytest.raises(FsidError, match="smaller texture_size"):
+        TextureArray(renderer._context, 8192, 2048)
 
 
 def test_memory_does_not_grow(renderer: Renderer) -> None:

@@ -15,6 +15,7 @@ import pytest
 from fsid.assets import MaterialMaps
 from fsid.render import Renderer
 from fsid.render.drawable import Drawable, View, background_drawable, panel_drawable
+from fsid.render.texels import Texels, texels_of
 from fsid.scene.model import Background, Camera, Distortion, Light, Material, Motion, Sky, Transform
 from golden_images import difference_from, encoded, keep_failure, too_different
 from render_scenes import bake_plain, block, grid, plain, point_light, sphere
@@ -25,7 +26,7 @@ ONE = (1.0, 1.0, 1.0)
 WARM, COOL, DARK = (0.7, 0.35, 0.15), (0.2, 0.35, 0.7), (0.06, 0.06, 0.05)
 
 
-def bake(family: str, variant: int, size: int) -> MaterialMaps:
+def bake(family: str, variant: int, size: int) -> Texels:
     """Closed formulas: checks (mix), dots (pattern), waves (height), rust (metallic and roughness)."""
     if family in ("plain", "metal"):
         return bake_plain(family, variant, size)
@@ -41,7 +42,7 @@ def bake(family: str, variant: int, size: int) -> MaterialMaps:
         "waves": (wave, zero, zero + 0.5, zero + 0.3, wave, zero),
         "rust": (zero, rust, zero + 0.5, 0.25 + 0.6 * rust, 0.5 - 0.2 * rust, 1 - rust),
     }[family]
-    return MaterialMaps(*(m.astype(np.float32) for m in maps), relief_m=0.02, tile_m=0.5)
+    return texels_of(MaterialMaps(*(m.astype(np.float32) for m in maps), relief_m=0.02, tile_m=0.5))
 
 
 def patterned(family: str, *colours: tuple[float, float, float], turn_deg: float = 0.0) -> Material:

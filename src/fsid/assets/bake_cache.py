@@ -22,16 +22,24 @@ import tempfile
 import zipfile
 import zlib
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from functools import cache
 from io import BytesIO
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
 from fsid.assets.maps import MaterialMaps
 
-LIMIT_BYTES = 2 * 2**30
+LIMIT_BYTES = 4 * 2**30
 """Size of the folder beyond which the entries that were used longest ago are deleted."""
+
+Arrays = dict[str, np.ndarray]
+Result = TypeVar("Result")
+
+_added: dict[Path, int] = {}
+"""Bytes that this process has written to a folder since it looked at the folder's size."""
 
 _BYTES = ("mix", "pattern", "detail", "roughness", "metallic")
 _LEVELS = {"detail": 254}
@@ -68,24 +76,40 @@ def content_key(parts: Iterable[bytes]) -> str:
     return digest.hexdigest()[:32]
 
 
-def cached(name: str, key: str, size: int, bake: Callable[[], MaterialMaps]) -> MaterialMaps:
-    """`bake()` as it comes out of its packed form, from the cache where it has an entry.
+def stored(
+    name: str, key: str, make: Callable[[], Arrays], use: Callable[[Arrays], Result], *, worth: float = 1.0
+) -> Result:
+    """`use(make())`, with what `make` returns from the cache where it has an entry.
 
-    name: readable part of the file name. key: `content_key` of everything that the result depends on.
+    name: readable part of the file name. key: `content_key` of everything that the arrays depend on. use:
+    raises ValueError or KeyError for arrays that are not of this kind. worth: arrays are deflated where less
+    than this share is left of them.
     """
     folder = cache_folder("materials")
     if folder is None:
-        return unpack(pack(bake()), size)
-    path = folder / f"{name}-{size}-{key}.npz"
-    found = _read(path, size)
-    if found is not None:
-        return found
-    packed = pack(bake())
-    _write(path, packed)
-    return unpack(packed, size)
+        return use(make())
+    path = folder / f"{name}-{key}.npz"
+    with suppress(OSError, ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile, zlib.error):
+        result = use(_read(path))
+        with suppress(OSError):
+            os.utime(path)
+        return result
+    arrays = make()
+    _write(path, arrays, worth)
+    return use(arrays)
 
 
-def pack(maps: MaterialMaps) -> dict[str, np.ndarray]:
+def cached(name: str, key: str, size: int, bake: Callable[[], MaterialMaps]) -> MaterialMaps:
+    """`bake()` as it comes out of its packed form, from the cache where it has an entry; see `stored`."""
+    return stored(f"{name}-{size}", key, lambda: pack(bake()), lambda packed: unpack(packed, size))
+
+
+def rounded(maps: MaterialMaps) -> MaterialMaps:
+    """The maps as they come out of their packed form."""
+    return unpack(pack(maps), len(maps.height))
+
+
+def pack(maps: MaterialMaps) -> Arrays:
     """The maps in integers, each texel as its difference from the one above: small after compression."""
     size = len(maps.height)
     planes = np.empty((7, size, size), np.uint8)
@@ -99,7 +123,7 @@ def pack(maps: MaterialMaps) -> dict[str, np.ndarray]:
     return {"planes": planes, "metres": np.array([maps.relief_m, maps.tile_m]), "colours": colours}
 
 
-def unpack(packed: dict[str, np.ndarray], size: int) -> MaterialMaps:
+def unpack(packed: Arrays, size: int) -> MaterialMaps:
     """The inverse of `pack` up to its rounding. Raises ValueError where the arrays are not `size` wide."""
     planes, metres, colours = packed["planes"], packed["metres"], packed["colours"]
     shapes = (planes.shape, metres.shape, colours.shape[1:])
@@ -117,33 +141,48 @@ def unpack(packed: dict[str, np.ndarray], size: int) -> MaterialMaps:
     return MaterialMaps(**maps, relief_m=relief_m, tile_m=tile_m, colours=triple)
 
 
-def _read(path: Path, size: int) -> MaterialMaps | None:
-    try:
-        with np.load(path, allow_pickle=False) as entry:
-            maps = unpack({name: entry[name] for name in ("planes", "metres", "colours")}, size)
-        os.utime(path)
-        return maps
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error):
-        return None
+def _read(path: Path) -> Arrays:
+    """The arrays of a file; every byte of them is checked by the archive's CRC-32."""
+    with zipfile.ZipFile(path) as archive:
+        members = {name.removesuffix(".npy"): archive.read(name) for name in archive.namelist()}
+    return {
+        name: np.lib.format.read_array(BytesIO(data), allow_pickle=False) for name, data in members.items()
+    }
 
 
-def _write(path: Path, packed: dict[str, np.ndarray]) -> None:
+def _write(path: Path, arrays: Arrays, worth: float) -> None:
     buffer = BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
-        for name, array in packed.items():
-            with archive.open(f"{name}.npy", "w") as member:
-                np.lib.format.write_array(member, array, allow_pickle=False)
+    with zipfile.ZipFile(buffer, "w", compresslevel=1) as archive:
+        for name, array in arrays.items():
+            member = BytesIO()
+            np.lib.format.write_array(member, array, allow_pickle=False)
+            kind = zipfile.ZIP_DEFLATED if _deflates(array, worth) else zipfile.ZIP_STORED
+            archive.writestr(f"{name}.npy", member.getbuffer(), kind)
     part = None
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, part = tempfile.mkstemp(suffix=".part", dir=path.parent)
         with os.fdopen(handle, "wb") as file:
-            file.write(buffer.getvalue())
+            file.write(buffer.getbuffer())
         os.replace(part, path)
-        _keep_below(path.parent, LIMIT_BYTES)
+        _count(path.parent, len(buffer.getbuffer()))
     except OSError:
         if part is not None:
             Path(part).unlink(missing_ok=True)
+
+
+def _deflates(array: np.ndarray, worth: float) -> bool:
+    """Whether the first eighth of an array deflates to less than `worth` of itself."""
+    sample = np.ascontiguousarray(array).reshape(-1)[: -(-array.size // 8)].tobytes()
+    return len(zlib.compress(sample, 1)) < worth * len(sample)
+
+
+def _count(folder: Path, added_bytes: int) -> None:
+    """Keep the folder below its limit, looking only after every 64th part of it that this process adds."""
+    _added[folder] = _added.get(folder, LIMIT_BYTES) + added_bytes
+    if _added[folder] > LIMIT_BYTES // 64:
+        _keep_below(folder, LIMIT_BYTES)
+        _added[folder] = 0
 
 
 def _keep_below(folder: Path, limit_bytes: int) -> None:

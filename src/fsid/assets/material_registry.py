@@ -164,13 +164,18 @@ def bake_material(family: str, variant: int, size: int = 1024) -> MaterialMaps:
     0 .. MATERIAL_VARIANTS - 1; a texture set has but one, whatever the number. size: a power of two from 64
     to 8192. Raises FsidError.
     """
-    if variant not in range(MATERIAL_VARIANTS):
-        raise FsidError(f"material variant {variant} of '{family}': must be 0 .. {MATERIAL_VARIANTS - 1}")
-    if not 64 <= size <= 8192 or size & (size - 1):
-        raise FsidError(f"material size {size}: must be a power of two from 64 to 8192")
+    _check(family, variant, size)
     base, layers = _split(family)
     if base.startswith(PREFIX) and not layers:
         return bake_texture(base, size)
+    name, key = material_key(family, variant, size)
+    return cached(name, key, size, lambda: draw_material(family, variant, size))
+
+
+def material_key(family: str, variant: int, size: int) -> tuple[str, str]:
+    """A readable name of a bake, and the key of all that it depends on but its size. Raises FsidError."""
+    _check(family, variant, size)
+    base, layers = _split(family)
     modules = tuple(_OVERLAYS[layer].__module__ for layer in layers)
     if base.startswith(PREFIX):
         key = content_key([texture_key(base).encode(), code_key((*modules, *SHARED)).encode()])
@@ -179,7 +184,7 @@ def bake_material(family: str, variant: int, size: int = 1024) -> MaterialMaps:
         key = code_key((_material(base).draw.__module__, *modules, *SHARED))
         name = base
     label = "+".join((name, *layers))
-    return cached(f"{label}-{variant}", key, size, lambda: draw_material(family, variant, size))
+    return f"{label}-{variant}", key
 
 
 def draw_material(family: str, variant: int, size: int) -> MaterialMaps:
@@ -196,6 +201,13 @@ def draw_material(family: str, variant: int, size: int) -> MaterialMaps:
     for number, layer in enumerate(layers):
         maps = _OVERLAYS[layer](rng_of(f"{layer}{number}", variant), variant, maps)
     return maps
+
+
+def _check(family: str, variant: int, size: int) -> None:
+    if variant not in range(MATERIAL_VARIANTS):
+        raise FsidError(f"material variant {variant} of '{family}': must be 0 .. {MATERIAL_VARIANTS - 1}")
+    if not 64 <= size <= 8192 or size & (size - 1):
+        raise FsidError(f"material size {size}: must be a power of two from 64 to 8192")
 
 
 def _split(family: str) -> tuple[str, tuple[str, ...]]:

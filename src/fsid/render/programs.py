@@ -23,11 +23,6 @@ def load_program(
     return context.program(vertex_shader=_source(vertex), fragment_shader=source)
 
 
-def load_compute(context: moderngl.Context, name: str) -> moderngl.ComputeShader:
-    """A compute shader of one file."""
-    return context.compute_shader(_source(name))
-
-
 def _register(context: moderngl.Context) -> None:
     for name in _INCLUDES:
         context.includes.setdefault(name, _source(name))

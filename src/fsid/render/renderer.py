@@ -19,7 +19,6 @@ from typing import Any, ClassVar, Self
 import moderngl
 import numpy as np
 
-from fsid.assets import bake_material
 from fsid.errors import FsidError
 from fsid.render.buffers import Buffers
 from fsid.render.camera import NEAR_M, lens_of
@@ -30,7 +29,7 @@ from fsid.render.flow import flow_between
 from fsid.render.frame import Frame
 from fsid.render.geometry import Geometry, draw_commands, in_view, merge
 from fsid.render.lamps import lamps_of
-from fsid.render.layers import Bake, Layer, LayerStore
+from fsid.render.layers import Layer, LayerStore
 from fsid.render.programs import load_program
 from fsid.render.quality import QUALITIES, tap_table
 from fsid.render.reflectance import reflectance_table
@@ -39,6 +38,7 @@ from fsid.render.shadows import COLUMNS, ShadowPlan, Source, plan_shadows
 from fsid.render.shadows import NEAR_M as SHADOW_NEAR_M
 from fsid.render.sky import panorama
 from fsid.render.targets import ShadowAtlas, Targets
+from fsid.render.texels import Bake, bake_texels
 from fsid.scene.model import Material, Scene
 
 Mark = Callable[[str], None]
@@ -156,13 +156,14 @@ class Renderer:
         self,
         view: View,
         *,
-        bake: Bake = bake_material,
+        bake: Bake = bake_texels,
         shift_px: tuple[float, float] = (0.0, 0.0),
         mark: Mark = lambda stage: None,
     ) -> Frame:
         """The frame of a view; `render` without the scene.
 
-        bake: where material maps come from. shift_px: moves the image by a part of a pixel (right, down).
+        bake: where the texels of materials come from. shift_px: moves the image by a part of a pixel (right,
+        down).
         """
         if Renderer._active is not self:
             raise FsidError("this Renderer is closed")
