@@ -5,6 +5,8 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -130,3 +132,13 @@ def test_a_broken_photograph_is_named_and_leaves_no_shard(tmp_path: Path):
     with pytest.raises(FsidError, match=r"broken\.png"):
         generate(tmp_path / "out", small(f"images={folder}"), count=1)
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["config.yaml"]
+
+
+@pytest.mark.parametrize("module", ["fsid.dataset.worker", "fsid.cli.main"])
+def test_workers_start_without_what_they_do_not_need(module: str):
+    """A worker imports both: its task, and the command that started it."""
+    script = (
+        f"import sys, {module}; print({{'scipy.stats', 'skimage', 'matplotlib', 'torch'}} & set(sys.modules))"
+    )
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == "set()"

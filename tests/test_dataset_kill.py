@@ -134,6 +134,17 @@ def test_kills_while_rendering_change_nothing(tmp_path: Path) -> None:
     check_whole(tmp_path / "out", content(tmp_path / "calm"), 6)
 
 
+def test_what_the_killed_left_half_written_goes_with_the_next_run(tiny: list[str], tmp_path: Path) -> None:
+    """Also where nothing else is left to do."""
+    left = (".shard-00001.tar.elsewhere-27704.part", "config.yaml.part", "README.md.part")
+    for _ in range(2):
+        for name in left:
+            (tmp_path / name).write_bytes(b"half a")
+        finish(tmp_path, tiny, 8, SHARD)
+        assert sorted(path.name for path in tmp_path.iterdir() if path.suffix == ".part") == []
+        assert len(content(tmp_path)) == 2
+
+
 def test_a_run_keeps_others_out_of_its_folder(tiny: list[str], tmp_path: Path) -> None:
     process = start(tmp_path, 2000, SHARD, tiny)
     try:

@@ -18,7 +18,6 @@ from types import MappingProxyType
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
-from scipy.stats import wasserstein_distance
 from skimage.color import rgb2lab
 from skimage.feature import canny
 
@@ -95,6 +94,8 @@ def pool(measured: list[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
 
 def distance(values: np.ndarray, reference: np.ndarray) -> float:
     """The module's equation; 0 for equal sets, about 1 where they lie a standard deviation apart."""
+    from scipy.stats import wasserstein_distance  # slow to import, and generating needs none of it
+
     spread = float(np.std(reference))
     return float(wasserstein_distance(values, reference)) / max(spread, 1e-6)
 

@@ -15,7 +15,6 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from scipy.stats import poisson as distribution
 
 EXACT_BELOW = 10.0
 _PER_ELECTRON = 32
@@ -68,6 +67,8 @@ def _few(rng: np.random.Generator, lam: np.ndarray) -> np.ndarray:
 @cache
 def _alias_table() -> np.ndarray:
     """(rows * 64,) uint32, a column per count: 26 bits its share of itself, 6 bits whose the rest is."""
+    from scipy.stats import poisson as distribution  # slow to import, and most profiles count no electrons
+
     rows = np.arange(int(EXACT_BELOW * _PER_ELECTRON) + 1) / _PER_ELECTRON
     share = distribution.pmf(np.arange(_COUNTS), rows[:, None]) * _COUNTS
     kept, other = np.ones_like(share), np.tile(np.arange(_COUNTS, dtype=np.uint32), (len(rows), 1))
