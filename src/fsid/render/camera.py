@@ -23,6 +23,9 @@ NEAR_M = 0.02
 MODELS = {"brown-conrady": (1, 5), "fisheye": (2, 4)}
 """Distortion model -> its number in shaders/lens.glsl and how many coefficients it has."""
 
+_STRAIGHT = 3
+"""LENS of shaders/lens.glsl that looks a pinhole image up in a larger one."""
+
 _WIDEST_TANGENT = 6.0
 _MOST_PIXELS = 3.0
 
@@ -176,7 +179,7 @@ def _bent(camera: Camera, rotation: np.ndarray, position: np.ndarray, focal: tup
     seen_px = (int(pixels[0]), int(pixels[1]))
     seen_focal = (float(1 / half[0]), float(1 / half[1]))
     if camera.distortion is None:
-        return Lens(rotation, position, focal, seen_px, seen_focal, 1, (0.0,) * 5)
+        return Lens(rotation, position, focal, seen_px, seen_focal, _STRAIGHT, (0.0,) * 5)
     given = camera.distortion.coefficients
     k = (*given, *(0.0,) * (5 - len(given)))
     return Lens(rotation, position, focal, seen_px, seen_focal, MODELS[camera.distortion.model][0], k)

@@ -119,19 +119,6 @@ def draw_commands(ranges: np.ndarray, visible: np.ndarray) -> np.ndarray:
     return commands
 
 
-def in_view(
-    spheres: np.ndarray, origin: np.ndarray, axes: np.ndarray, tan_xy: tuple[float, float]
-) -> np.ndarray:
-    """(N,) bool: spheres that touch the pyramid from `origin` along axes[2] (rows right, up, forward)."""
-    local = (spheres[:, :3] - origin) @ axes.T
-    radius = spheres[:, 3]
-    inside = local[:, 2] > -radius
-    for axis in (0, 1):
-        beyond = np.abs(local[:, axis]) - tan_xy[axis] * local[:, 2]
-        inside &= beyond < radius * np.hypot(1.0, tan_xy[axis])
-    return inside
-
-
 def _by_surface(mesh: Mesh) -> tuple[np.ndarray | None, np.ndarray, np.ndarray]:
     """(which vertices, their parts, indices): a vertex of two parts is doubled. None: all as they are."""
     part = np.zeros(len(mesh.vertices), np.uint32)

@@ -27,17 +27,18 @@ from fsid.render.drawable import BACKGROUND_ID, Drawable, View, view_of
 from fsid.render.exposure import Shot, shots_of
 from fsid.render.flow import flow_between
 from fsid.render.frame import Frame
-from fsid.render.geometry import Geometry, draw_commands, in_view, merge
+from fsid.render.frustum import in_view, rectangles, seen_tiles
+from fsid.render.geometry import Geometry, draw_commands, merge
 from fsid.render.lamps import lamps_of
 from fsid.render.layers import Layer, LayerStore
 from fsid.render.programs import load_program
 from fsid.render.quality import QUALITIES, tap_table
 from fsid.render.reflectance import reflectance_table
 from fsid.render.room import Room, light_room, light_sky
-from fsid.render.shadows import COLUMNS, ShadowPlan, Source, plan_shadows
 from fsid.render.shadows import NEAR_M as SHADOW_NEAR_M
+from fsid.render.shadows import ShadowPlan, Source, plan_shadows
 from fsid.render.sky import panorama
-from fsid.render.targets import ShadowAtlas, Targets
+from fsid.render.targets import Place, ShadowAtlas, Targets
 from fsid.render.texels import Bake, bake_texels
 from fsid.scene.model import Material, Scene
 
@@ -93,7 +94,11 @@ class Renderer:
         self._block_depth = load_program(context, "screen.vert", "block_depth.frag")
         self._occlusion = load_program(context, "screen.vert", "occlusion.frag")
         self._blur = load_program(context, "screen.vert", "blur.frag")
-        self._shades: dict[tuple[int, bool, bool], moderngl.Program] = {}
+        self._copy = load_program(context, "screen.vert", "copy_result.frag")
+        self._shadow_blocks = load_program(
+            context, "screen.vert", "shadow_blocks.frag", LENS=0, GRID=self._grid
+        )
+        self._shades: dict[tuple[int, bool, bool, bool], moderngl.Program] = {}
         self._targets = Targets(context, self._grid)
         self._atlas = ShadowAtlas(context)
         taps = tap_table(self._quality)
@@ -209,29 +214,36 @@ class Renderer:
         buffers = Buffers(self._context, geometry, plan, room, sky)
         try:
             mark("upload")
-            self._draw_shadows(geometry, plan, buffers, casts)
+            self._draw_shadows(geometry, plan, shot, buffers, casts)
             mark("shadows")
-            self._draw_samples(geometry, shot, buffers, glass=False)
+            glass = np.array([drawable.is_glass for drawable in view.drawables])
+            self._draw_samples(geometry, shot, buffers, np.ones_like(glass), layer=0)
             mark("samples")
             self._draw_occlusion(shot, buffers)
             mark("occlusion")
+            self._draw_shadow_blocks(view, shot, plan, buffers)
+            self._targets.begin_shading()
             self._shade(view, shot, plan, room, sky, buffers, glass=False)
-            if any(drawable.is_glass for drawable in view.drawables):
-                self._draw_samples(geometry, shot, buffers, glass=True)
+            if glass.any():
+                self._draw_samples(geometry, shot, buffers, glass, layer=1)
+                self._targets.begin_glass(_places(geometry.spheres[glass], shot, self._targets.size))
                 self._shade(view, shot, plan, room, sky, buffers, glass=True)
+                self._targets.end_glass()
+                self._targets.draw(lambda: buffers.draw_screen(self._copy))
             self._context.finish()
             mark("shading")
         finally:
             buffers.release()
 
     def _draw_shadows(
-        self, geometry: Geometry, plan: ShadowPlan, buffers: Buffers, casts: np.ndarray
+        self, geometry: Geometry, plan: ShadowPlan, shot: Shot, buffers: Buffers, casts: np.ndarray
     ) -> None:
+        reach = np.linalg.norm(geometry.spheres[:, :3] - shot.lens.position, axis=1) + geometry.spheres[:, 3]
         self._context.enable_only(moderngl.DEPTH_TEST)
         self._atlas.begin()
         array = buffers.vertex_array(self._depth)
         _set(self._depth, near=SHADOW_NEAR_M)
-        for tile in plan.tiles:
+        for tile in seen_tiles(plan.tiles, shot.lens, shot.seen_shift, float(reach.max())):
             tangent = 1.0 / tile.focal
             seen = casts.copy()
             if tile.range_m == 0:
@@ -246,11 +258,14 @@ class Renderer:
         buffers.draw_screen(self._moments)
         self._atlas.end_moments()
 
-    def _draw_samples(self, geometry: Geometry, shot: Shot, buffers: Buffers, *, glass: bool) -> None:
+    def _draw_samples(
+        self, geometry: Geometry, shot: Shot, buffers: Buffers, which: np.ndarray, *, layer: int
+    ) -> None:
+        """The G-buffer of drawables; layer: 0 of what is opaque, 1 of glass in front of that."""
         lens, shift = shot.lens, shot.seen_shift
         tangents = tuple((1 + abs(s)) / f for s, f in zip(shift, lens.seen_focal, strict=True))
         seen = np.flatnonzero(
-            in_view(geometry.spheres, lens.position, lens.rotation, (tangents[0], tangents[1]))
+            which & in_view(geometry.spheres, lens.position, lens.rotation, (tangents[0], tangents[1]))
         )
         distance = (
             np.linalg.norm(geometry.spheres[seen, :3] - lens.position, axis=1) - geometry.spheres[seen, 3]
@@ -259,8 +274,8 @@ class Renderer:
         focal = (lens.seen_focal[0], -lens.seen_focal[1])
         _set(self._visible, origin=lens.position, axes=lens.rotation.T, focal=focal, shift=shift, near=NEAR_M)
         self._context.enable_only(moderngl.DEPTH_TEST)
-        _set(self._visible, layer=int(glass))
-        self._targets.begin_samples(over=glass)
+        _set(self._visible, layer=layer)
+        self._targets.begin_samples(over=layer == 1)
         buffers.draw(buffers.vertex_array(self._visible), commands)
 
     def _draw_occlusion(self, shot: Shot, buffers: Buffers) -> None:
@@ -283,6 +298,34 @@ class Renderer:
             self._targets.begin_blur(back=back)
             buffers.draw_screen(self._blur)
 
+    def _draw_shadow_blocks(self, view: View, shot: Shot, plan: ShadowPlan, buffers: Buffers) -> None:
+        lens = shot.lens
+        _set(
+            self._shadow_blocks,
+            blocks=self._targets.blocks,
+            through=_has_lobes(view),
+            seen=self._targets.seen,
+            seen_focal=lens.seen_focal,
+            seen_shift=shot.seen_shift,
+            axes=lens.rotation.T,
+            origin=lens.position,
+        )
+        self._use_shadows(self._shadow_blocks, plan)
+        buffers.use()
+        self._targets.begin_shadow_blocks(plan.light_count)
+        buffers.draw_screen(self._shadow_blocks)
+
+    def _use_shadows(self, program: moderngl.Program, plan: ShadowPlan) -> None:
+        """Bind what lights.glsl needs, but for the table of the lights."""
+        _set(
+            program,
+            tile_px=float(plan.tile_px),
+            search_taps=self._quality.search_taps,
+            filter_taps=self._quality.filter_taps,
+        )
+        self._atlas.use(compare_unit=2, moments_unit=3)
+        self._taps.use(7)
+
     def _shade(
         self,
         view: View,
@@ -297,10 +340,9 @@ class Renderer:
         lens, camera = shot.lens, view.camera
         pixel_rad = 2.0 / (lens.focal[0] * camera.width)
         level = -1.0 if sky is None else max(float(np.log2(pixel_rad * len(sky) / np.pi)), 0.0)
-        program = self._shade_program(lens.model, _has_lobes(view), glass)
+        program = self._shade_program(lens.model, _has_lobes(view), _has_areas(view), glass)
         _set(
             program,
-            grid=self._grid,
             size=self._targets.size,
             seen=self._targets.seen,
             focal=lens.focal,
@@ -312,10 +354,7 @@ class Renderer:
             axes=lens.rotation.T,
             origin=lens.position,
             light_count=plan.light_count,
-            tile_px=float(plan.tile_px),
-            tile_columns=COLUMNS,
-            search_taps=self._quality.search_taps,
-            filter_taps=self._quality.filter_taps,
+            block_lights=0 if glass else self._targets.block_lights,
             max_probes=self._quality.probes,
             ambient_sides=room.sides,
             mean_sides=room.radiance.mean((1, 2)),
@@ -325,27 +364,26 @@ class Renderer:
             vignetting=camera.vignetting,
             magnification=1.0,
         )
-        self._targets.begin_shading(over=glass)
         self._layers.use(0, 1)
-        self._atlas.use(compare_unit=2, moments_unit=3)
-        self._taps.use(7)
+        self._use_shadows(program, plan)
         self._reflectance.use(14)
         buffers.use()
         red, blue = camera.chromatic_aberration
         for aberration, colours in _colour_passes(red, blue):
-            self._targets.mask(*colours)
             _set(program, magnification=1.0 + aberration)
-            buffers.draw_screen(program)
+            self._targets.draw(lambda: buffers.draw_screen(program), colours)
 
-    def _shade_program(self, lens_model: int, lobes: bool, glass: bool) -> moderngl.Program:
-        key = (lens_model, lobes, glass)
+    def _shade_program(self, lens_model: int, lobes: bool, areas: bool, glass: bool) -> moderngl.Program:
+        key = (lens_model, lobes, areas, glass)
         if key not in self._shades:
             self._shades[key] = load_program(
                 self._context,
                 "screen.vert",
                 "shade.frag",
+                GRID=self._grid,
                 LENS=lens_model,
                 LOBES=int(lobes),
+                AREAS=int(areas),
                 GLASS=int(glass),
             )
         return self._shades[key]
@@ -357,6 +395,18 @@ def _has_lobes(view: View) -> bool:
         for drawable in view.drawables
         for m in drawable.materials
     )
+
+
+def _has_areas(view: View) -> bool:
+    return any(light.kind == "area" for light in view.lights)
+
+
+def _places(spheres: np.ndarray, shot: Shot, size: tuple[int, int]) -> list[Place]:
+    """Parts of the image that hold the spheres; of a bent image all of it."""
+    lens = shot.lens
+    if lens.model:
+        return [(0, 0, *size)]
+    return rectangles(spheres, lens.position, lens.rotation, lens.seen_focal, shot.seen_shift, lens.seen_px)
 
 
 def _colour_passes(red: float, blue: float) -> list[tuple[float, tuple[bool, bool, bool]]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import moderngl
@@ -13,6 +14,10 @@ from fsid.render.frame import Frame
 _ID_LEVELS = 65535
 
 
+Place = tuple[int, int, int, int]
+"""x, y, width, height of a part of the image, pixels."""
+
+
 class Targets:
     """G-buffer of grid^2 samples per pixel (20 bytes each), occlusion per 2 x 2 pixels, result per pixel."""
 
@@ -21,14 +26,18 @@ class Targets:
         self._grid = grid
         self._owned: list[Any] = []
         self._results: list[list[Any]] = []
-        self._final = 0
+        self._drawn: tuple[list[Any], Sequence[Place]] = ([], [])
+        self._lit: list[Any] = []
+        self._lit_rows = 0
+        self.block_lights = 0
         self.size = self.seen = (0, 0)
 
     def resize(self, size: tuple[int, int], seen: tuple[int, int]) -> None:
         """Make the images for `size` pixels and a G-buffer of `seen` pixels, unless they are there."""
         if (self.size, self.seen) == (size, seen):
             return
-        limit = int(self._context.info["GL_MAX_TEXTURE_SIZE"]) // self._grid
+        self._limit = int(self._context.info["GL_MAX_TEXTURE_SIZE"])
+        limit = self._limit // self._grid
         for width, height in (size, seen):
             if not (0 < width <= limit and 0 < height <= limit):
                 raise FsidError(
@@ -66,6 +75,26 @@ class Targets:
         self._samples.use(0)
         self._to_block_depth.use()
 
+    def begin_shadow_blocks(self, lights: int) -> None:
+        """Draw the share of each light that reaches the blocks, of as many lights as an image is high; unit
+        0 holds the G-buffer, and unit 15 is the result for what is drawn next."""
+        width, height = self.blocks
+        self.block_lights = min(lights, self._limit // height)
+        rows = max(self.block_lights, 1) * height
+        if rows != self._lit_rows:
+            self._release_lit()
+            texture = self._context.texture((width, rows), 1, dtype="f4")
+            texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+            self._lit, self._lit_rows = [self._context.framebuffer([texture]), texture], rows
+        self._lit[1].use(15)
+        self._samples.use(0)
+        self._lit[0].use()
+
+    def _release_lit(self) -> None:
+        for item in self._lit:
+            item.release()
+        self._lit, self._lit_rows = [], 0
+
     def begin_occlusion(self) -> None:
         """Draw the occlusion; units 0, 1 hold the G-buffer and the depth of the blocks."""
         self._samples.use(0)
@@ -77,35 +106,48 @@ class Targets:
         (self._blurred if back else self._open).use(0)
         (self._to_open if back else self._to_blurred).use()
 
-    def begin_shading(self, *, over: bool) -> None:
-        """Draw the result; units 8, 9 hold the G-buffer and the occlusion; units 11 to 13, with `over`, the
-        result so far, and what is drawn becomes the result."""
+    def begin_shading(self) -> None:
+        """Draw the result; units 8, 9 hold the G-buffer and the occlusion."""
         self._samples.use(8)
         self._open.use(9)
-        if over:
-            if len(self._results) == 1:
-                self._results.append(self._result())
-            for unit, texture in zip((11, 12, 13), self._results[0][1:], strict=True):
-                texture.use(unit)
-        self._final = 1 if over else 0
-        self._results[self._final][0].use()
+        self._drawn = (self._results[0], [(0, 0, *self.size)])
 
-    def mask(self, red: bool, green: bool, blue: bool) -> None:
-        """Let the next draws write some colours only; depth and labels go with green."""
-        self._results[self._final][0].color_mask = ((red, green, blue, green), (green,) * 4, (green,) * 4)
+    def begin_glass(self, places: Sequence[Place]) -> None:
+        """Draw, in some places only, what goes over the result; units 11 to 13 hold the result so far."""
+        if len(self._results) == 1:
+            self._results.append(self._result())
+        for unit, texture in zip((11, 12, 13), self._results[0][1:], strict=True):
+            texture.use(unit)
+        self._drawn = (self._results[1], places)
+
+    def end_glass(self) -> None:
+        """Draw the same places of the result; units 11 to 13 hold what belongs there."""
+        for unit, texture in zip((11, 12, 13), self._results[1][1:], strict=True):
+            texture.use(unit)
+        self._drawn = (self._results[0], self._drawn[1])
+
+    def draw(self, draw_screen: Callable[[], None], colours: tuple[bool, bool, bool] = (True,) * 3) -> None:
+        """Draw every place; some colours only, of which green takes depth and labels along."""
+        (framebuffer, *_), places = self._drawn
+        green = colours[1]
+        framebuffer.color_mask = ((*colours, green), (green,) * 4, (green,) * 4)
+        for place in places:
+            framebuffer.scissor = place
+            framebuffer.use()
+            draw_screen()
+        framebuffer.scissor = None
 
     def read_radiance(self) -> np.ndarray:
         """(H, W, 4): radiance and depth (0: nothing hit), row 0 at the top. A view of what was read."""
         width, height = self.size
-        return np.frombuffer(self._results[self._final][1].read(), np.float32).reshape(height, width, 4)
+        return np.frombuffer(self._results[0][1].read(), np.float32).reshape(height, width, 4)
 
     def read_frame(self) -> Frame:
         """The result, row 0 at the top."""
         width, height = self.size
         radiance = self.read_radiance()
         albedo, normal = (
-            np.frombuffer(t.read(), np.uint16).reshape(height, width, 4)
-            for t in self._results[self._final][2:]
+            np.frombuffer(t.read(), np.uint16).reshape(height, width, 4) for t in self._results[0][2:]
         )
         depth = radiance[..., 3]
         return Frame(
@@ -121,6 +163,7 @@ class Targets:
         for item in [*self._owned, *(part for result in self._results for part in result)]:
             item.release()
         self._owned, self._results = [], []
+        self._release_lit()
 
     def _result(self) -> list[Any]:
         """A framebuffer and its images: radiance and depth; albedo and object id; normal."""

@@ -1,6 +1,5 @@
 // Pixels of the image -> rays -> samples of the G-buffer, which is a pinhole image.
-// LENS: 0 pinhole, 1 Brown-Conrady, 2 fisheye.
-uniform int grid;
+// LENS: 0 pinhole, 1 Brown-Conrady, 2 fisheye, 3 pinhole of another size (chromatic aberration alone).
 uniform ivec2 size;        // of the image, pixels
 uniform ivec2 seen;        // of the G-buffer, pixels
 uniform vec2 focal;        // of the image's camera, half image sizes
@@ -12,7 +11,7 @@ uniform float magnification;   // of this colour
 uniform float k[5];
 
 // Normalised coordinates (x right, y down) whose distorted image is at `d`: Newton's method.
-#if LENS == 0
+#if LENS == 0 || LENS == 3
 vec2 undistorted(vec2 d) { return d; }
 #elif LENS == 1
 vec2 undistorted(vec2 d) {
@@ -66,3 +65,9 @@ vec3 seen_ray(vec2 pixel) {
     vec2 p = (pixel / vec2(seen) * 2.0 - 1.0 - seen_shift) / seen_focal;
     return vec3(p.x, -p.y, 1.0);
 }
+
+// The G-buffer's texel that stands for a block of 2 x 2 pixels, and where that is, in its pixels.
+ivec2 block_texel(ivec2 block) {
+    return clamp(block * (2 * GRID) + GRID, ivec2(0), seen * GRID - 1);
+}
+vec2 block_place(ivec2 block) { return (vec2(block_texel(block)) + 0.5) / float(GRID); }

@@ -1,5 +1,6 @@
 // Lights and their shadows. See fsid.render.shadows for the tables and fsid.scene.model.Light for the units.
-// Loops have a computed number of turns: llvmpipe runs both sides of every branch, but leaves a loop early.
+// Loops test at their end: llvmpipe has no other jump than back, so that every other loop runs once more than
+// needed, and both sides of every branch run.
 layout(binding = 6) uniform sampler2D light_table;
 uniform int light_count;
 layout(binding = 2) uniform sampler2DShadow shadow_compare;
@@ -15,10 +16,10 @@ const float LEAK = 0.1;          // share of light that overlapping occluders le
 const float STEEPEST = 12.0;     // tangent of the steepest receiver that is followed
 const float DARK = 0.98;         // share of the search that is blocked where nothing more is looked for
 const float PI = 3.14159265;
+const int TILE_COLUMNS = 6;
 uniform int search_taps;
 uniform int filter_taps;
 uniform float tile_px;
-uniform int tile_columns;
 
 struct Light {
     vec3 position;
@@ -82,7 +83,7 @@ Receiver receiver_of(Light light, vec3 d, vec3 n) {
     r.texel = r.tile_size / tile_px;
     r.inside = !sun || max(abs(at.x), abs(at.y)) < 0.5 * r.tile_size;
     r.to_atlas = tile_px / (atlas * r.tile_size);
-    r.corner = vec2(tile % tile_columns, tile / tile_columns) * tile_px / atlas;
+    r.corner = vec2(tile % TILE_COLUMNS, tile / TILE_COLUMNS) * tile_px / atlas;
     r.centre = r.corner + r.to_atlas * (0.5 * r.tile_size + at);
     float per_u = sun ? light.range_m : 1.0 / SHADOW_NEAR;
     vec3 w = axes * light.half_width, h = axes * light.half_height;
@@ -125,17 +126,20 @@ bool alone(Receiver r, float width) {
 // Share of the light seen from `position`: soft shadows by the mean depth of what is in the way
 // (Fernando 2005), with fixed taps that are areas and not points, so that they leave no pattern; where the
 // penumbra is a few texels, a percentage-closer filter on the depth itself. wanted: false asks nothing.
-float visibility(Light light, vec3 position, vec3 face_normal, bool wanted) {
+// even_m: how far from here, in metres, the result is as smooth as its filter makes it.
+float visibility(Light light, vec3 position, vec3 face_normal, bool wanted, out float even_m) {
     Receiver r = receiver_of(light, position - light.position, face_normal);
     float shaded = 0.0, blocked_sum = 0.0, blocked;
     int taps = wanted && r.inside && !alone(r, 1.2 * r.search) ? search_taps : 0;
     mat2 search = r.spread * (r.search / max(max(length(r.spread[0]), length(r.spread[1])), 1e-12));
     float width = 0.3 * r.search;
-    for (int i = 0; i < taps; ++i) {
+    int i = 0;
+    do {
         vec2 offset = search * texelFetch(tap_table, ivec2(i, 0), 0).xy;
-        shaded += 1.0 - soft_tap(r, offset, width, blocked);
-        blocked_sum += blocked;
-    }
+        float lit = soft_tap(r, offset, width, blocked);
+        shaded += i < taps ? 1.0 - lit : 0.0;
+        blocked_sum += i < taps ? blocked : 0.0;
+    } while (++i < taps);
     bool dark = shaded > DARK * float(search_taps);
     bool mixed = shaded >= 1e-4 && !dark;
     float nearer = max(blocked_sum / max(shaded, 1e-4) - r.u, 0.0);
@@ -147,21 +151,25 @@ float visibility(Light light, vec3 position, vec3 face_normal, bool wanted) {
 
     float sharp_lit = 0.0, bias = r.bias + (abs(r.slope.x) + abs(r.slope.y)) * r.texel;
     int sharp = mixed && soft < 1.0 ? filter_taps : 0;
-    for (int i = 0; i < sharp; ++i) {
+    i = 0;
+    do {
         vec2 offset = spread * texelFetch(tap_table, ivec2(i, 1), 0).xy;
         float limit = r.u + dot(r.slope, offset) + bias;
         sharp_lit += textureLod(shadow_compare, vec3(r.centre + r.to_atlas * offset, 1.0 - limit), 0.0);
-    }
+    } while (++i < sharp);
     float soft_lit = 0.0;
     int smooth_taps = mixed && soft > 0.0 ? filter_taps : 0;
-    for (int i = 0; i < smooth_taps; ++i) {
+    i = 0;
+    do {
         vec2 offset = spread * texelFetch(tap_table, ivec2(i, 1), 0).xy;
         soft_lit += soft_tap(r, offset, 0.3 * wide, blocked);
-    }
+    } while (++i < smooth_taps);
     soft_lit /= float(filter_taps);
     float dim = 1.0 - soft_lit;
     soft_lit = max(soft_lit - LEAK * dim * dim * dim, 0.0);
     float lit = mix(sharp_lit / float(filter_taps), soft_lit, soft);
+    float even = r.inside ? mixed ? 0.5 * (wide + r.texel) : taps > 0 ? r.search : 1.2 * r.search : 1e9;
+    even_m = wanted ? even * (light.kind == SUN ? 1.0 : SHADOW_NEAR / r.u) : 0.0;
     return mixed ? lit : dark ? 0.0 : 1.0;
 }
 
@@ -185,7 +193,8 @@ float form_factor(Light light, vec3 position, vec3 n, int edges) {
     vec3 leaves = vec3(0), returns = vec3(0);
     float sum = 0.0;
     bool cut = false;
-    for (int i = 0; i < edges; ++i) {
+    int i = 0;
+    do {
         bool side = i < 4;     // the last edge closes what the horizon cuts
         vec3 a = side ? corner_of(light, centre, i) : leaves;
         vec3 b = side ? corner_of(light, centre, (i + 1) & 3) : returns;
@@ -198,9 +207,9 @@ float form_factor(Light light, vec3 position, vec3 n, int edges) {
         vec3 p = normalize(up ? crossing : a), q = normalize(down ? crossing : b);
         vec3 across = cross(p, q);
         float s = length(across);
-        bool counts = side ? max(ha, hb) > 0.0 : cut;
+        bool counts = i < edges && (side ? max(ha, hb) > 0.0 : cut);
         sum += counts && s > 1e-7 ? dot(across, n) * (atan(s, dot(p, q)) / s) : 0.0;
-    }
+    } while (++i < edges);
     return abs(sum) * (0.5 / PI);
 }
 

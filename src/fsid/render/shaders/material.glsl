@@ -1,5 +1,5 @@
 // Material evaluation: box mapping in metres, blended where the surface turns from one axis to the next.
-// Loops have a computed number of turns: llvmpipe runs both sides of every branch, but leaves a loop early.
+// Loops test at their end, as in lights.glsl.
 layout(binding = 0) uniform sampler2DArray masks;    // mix, pattern, detail, roughness
 layout(binding = 1) uniform sampler2DArray relief;   // slope u, slope v, spread, metallic
 uniform float max_probes;
@@ -39,7 +39,7 @@ Matter matter_at(Surface s, vec3 position, vec3 normal, vec3 dx, vec3 dy) {
     vec4 mask = vec4(0), other = vec4(0);
     vec3 gradient = vec3(0);
     float total = 0.0, texels = float(textureSize(masks, 0).x);
-    while (left != 0u) {
+    do {
         int axis = findLSB(left);
         left &= left - 1u;
         vec3 u, v;
@@ -57,11 +57,12 @@ Matter matter_at(Surface s, vec3 position, vec3 normal, vec3 dx, vec3 dy) {
         int probes = int(clamp(ceil(longest / across - 0.25), 1.0, max_probes));
         float level = log2(max(longest / float(probes), across) * texels);
         vec4 m = vec4(0), r = vec4(0);
-        for (int k = 0; k < probes; ++k) {
+        int k = 0;
+        do {
             vec3 probe = vec3(uv + along * ((float(k) + 0.5) / float(probes) - 0.5), s.layer);
             m += textureLod(masks, probe, level);
             r += textureLod(relief, probe, level);
-        }
+        } while (++k < probes);
         m /= float(probes);
         r /= float(probes);
         vec2 slope = (r.xy * 255.0 - 128.0) / SLOPE_LEVELS * s.slope_scale;
@@ -69,7 +70,7 @@ Matter matter_at(Surface s, vec3 position, vec3 normal, vec3 dx, vec3 dy) {
         other += weight[axis] * r;
         gradient += weight[axis] * (slope.x * tu + slope.y * tv);
         total += weight[axis];
-    }
+    } while (left != 0u);
     mask /= total;
     other /= total;
     gradient /= total;

@@ -32,15 +32,15 @@ void main() {
     float reach = min(0.5 * RADIUS_M * focal.x / max(p.z, 1e-3), MAX_SCREEN) * float(size.x);
     float r2 = RADIUS_M * RADIUS_M, sum = 0.0;
     float floor_m = 0.004 + 0.003 * p.z;
-    int count = hit ? taps : 0;
-    for (int i = 0; i < count; ++i) {
+    int i = 0, count = hit ? taps : 0;
+    do {
         vec2 tap = texelFetch(tap_table, ivec2(i, 2), 0).xy;
         ivec2 other = clamp(block + ivec2(round(tap * reach)), ivec2(0), size - 1);
         bool other_hit;
         vec3 v = at(other, other_hit) - p;
         float vv = dot(v, v), f = max(r2 - vv, 0.0);
         sum += other_hit ? f * f * f * max(dot(v, n) - floor_m, 0.0) / (vv + 0.0004) : 0.0;
-    }
+    } while (++i < count);
     float covered = sum * 5.0 * RADIUS_M / (r2 * r2 * r2 * float(taps));
     result = hit ? vec2(max(1.0 - covered, 0.1), p.z) : vec2(1.0, 0.0);
 }

@@ -2,8 +2,9 @@
 // Radiance of one pixel from its samples. Samples that lie on one plane of one surface are shaded once, at their
 // mean: the spread of their normals widens the highlight, and textures are filtered over the pixel. A pixel
 // inside a surface is one such group, one at an edge two or three. Output: the frame at its final size.
-// LOBES: 1 with clearcoat, sheen and translucency. GLASS: 1 in the second pass, whose samples are glass alone and
-// which looks what is behind up in the result of the first.
+// GRID: edge of the square of samples per pixel. LOBES: 1 with clearcoat, sheen and translucency. AREAS: 1 with
+// area lights. GLASS: 1 in the second pass, whose samples are glass alone and which looks what is behind up in
+// the result of the first.
 #include "encoding.glsl"
 #include "surfaces.glsl"
 #include "material.glsl"
@@ -12,6 +13,8 @@
 #include "lens.glsl"
 layout(binding = 8) uniform usampler2D samples;
 layout(binding = 9) uniform sampler2D occlusion;
+layout(binding = 15) uniform sampler2D lit_blocks;   // of shadow_blocks.frag
+uniform int block_lights;   // how many lights it holds
 layout(binding = 10) uniform sampler2D sky;   // equirectangular
 uniform float sky_level;  // mip level at which a texel of the sky is a pixel; -1 without sky
 uniform vec3 vignetting;
@@ -29,6 +32,7 @@ layout(location = 2) out vec4 out_normal;     // camera space, 0.5 + 0.5 n
 const float PLANE_TOLERANCE = 0.002;  // of the distance
 const float MIN_FACE_COSINE = 0.97;
 const float MIN_NORMAL_COSINE = 0.85;
+const int COUNT = GRID * GRID, MIDDLE = (GRID / 2) * (GRID + 1);   // samples of a pixel, and the labels' own
 const float COAT_F0 = 0.04;   // index 1.5
 
 struct Sample {
@@ -40,19 +44,19 @@ struct Sample {
 
 Sample sample_at(vec2 at) {
     vec3 ray = ray_at(at);
-    ivec2 texel = clamp(ivec2(seen_at(ray) * float(grid)), ivec2(0), seen * grid - 1);
+    ivec2 texel = clamp(ivec2(seen_at(ray) * float(GRID)), ivec2(0), seen * GRID - 1);
     uvec4 code = texelFetch(samples, texel, 0);
     vec3 face_normal = unpack_direction(code.y);
     float depth = uintBitsToFloat(code.w);
 #if LENS > 0
     // This ray meets the plane that the nearest ray of the pinhole image has met.
     vec3 facing = axes * face_normal;
-    depth *= clamp(dot(facing, seen_ray((vec2(texel) + 0.5) / float(grid))) / dot(facing, ray), 0.9, 1.1);
+    depth *= clamp(dot(facing, seen_ray((vec2(texel) + 0.5) / float(GRID))) / dot(facing, ray), 0.9, 1.1);
 #endif
     return Sample(ray * depth * axes + origin, unpack_direction(code.x), face_normal, depth, int(code.z) - 1);
 }
 
-vec2 place_of(ivec2 pixel, int i) { return vec2(pixel) + (vec2(i % grid, i / grid) + 0.5) / float(grid); }
+vec2 place_of(ivec2 pixel, int i) { return vec2(pixel) + (vec2(i % GRID, i / GRID) + 0.5) / float(GRID); }
 
 bool alike(Sample a, Sample b) {
     return a.surface == b.surface && dot(a.face_normal, b.face_normal) > MIN_FACE_COSINE
@@ -62,44 +66,81 @@ bool alike(Sample a, Sample b) {
 
 // The samples still `open` that are like the first of them, as one; they are taken out of `open`. Its normal
 // is the mean: its length tells the spread.
-Sample next_group(ivec2 pixel, inout uint open, out float members) {
-    int lowest = findLSB(open);
-    Sample first = sample_at(place_of(pixel, lowest));
+Sample next_group(Sample all[COUNT], inout uint open, out float members) {
+    Sample first = all[COUNT - 1];
+    for (int i = COUNT - 2; i >= 0; --i) if ((open & (1u << i)) != 0u) first = all[i];
     Sample mean = first;
-    members = 1.0;
-    open &= open - 1u;
-    for (int i = lowest + 1; i < grid * grid; ++i) {
-        Sample s = sample_at(place_of(pixel, i));
-        bool joins = (open & (1u << i)) != 0u && alike(first, s);
+    vec3 moved = vec3(0);
+    mean.normal = vec3(0);
+    members = 0.0;
+    uint rest = open;
+    for (int i = 0; i < COUNT; ++i) {
+        bool joins = (rest & (1u << i)) != 0u && alike(first, all[i]);
         float one = joins ? 1.0 : 0.0;
         open &= joins ? ~(1u << i) : ~0u;
         members += one;
-        mean.position += one * (s.position - first.position);
-        mean.normal += one * s.normal;
+        moved += one * (all[i].position - first.position);
+        mean.normal += one * all[i].normal;
     }
-    mean.position = first.position + (mean.position - first.position) / members;
+    open &= rest - 1u;    // the first itself, whatever its numbers
+    members = max(members, 1.0);
+    mean.position = first.position + moved / members;
     mean.normal /= members;
     return mean;
 }
 
-// Openness of the blocks around that lie at this depth: the blur of the fixed tap pattern stops at edges.
-float openness(vec3 position, float depth) {
-    vec3 local = axes * (position - origin);
-    vec2 at = seen_at(local / local.z) * 0.5 - 0.5;
-    ivec2 corner = ivec2(floor(at));
+// The four blocks of 2 x 2 pixels around a point.
+struct Blocks {
+    ivec2 at[4];
+    float share[4];     // bilinear
+    bool even;          // whether their samples lie on the point's own surface
+};
+
+Blocks blocks_around(Sample p) {
+    vec3 local = axes * (p.position - origin);
+    vec2 at = 0.5 * (seen_at(local / local.z) - block_place(ivec2(0)));
+    ivec2 corner = ivec2(floor(at)), last = textureSize(occlusion, 0) - 1;
     vec2 f = at - vec2(corner);
-    ivec2 last = textureSize(occlusion, 0) - 1;
-    float sum = 0.0, total = 0.0;
+    Blocks b;
+    b.even = all(greaterThanEqual(corner, ivec2(0))) && all(lessThan(corner, last));
     for (int i = 0; i < 4; ++i) {
         ivec2 cell = ivec2(i & 1, i >> 1);
-        vec2 o = texelFetch(occlusion, clamp(corner + cell, ivec2(0), last), 0).xy;
-        float d = (o.y - depth) / (0.02 * depth);
         vec2 near = mix(1.0 - f, f, vec2(cell));
-        float w = (near.x * near.y + 1e-3) / (1e-3 + d * d);
+        b.share[i] = near.x * near.y;
+        b.at[i] = clamp(corner + cell, ivec2(0), last);
+        ivec2 texel = block_texel(b.at[i]);
+        uvec4 code = texelFetch(samples, texel, 0);
+        vec3 position = seen_ray((vec2(texel) + 0.5) / float(GRID)) * uintBitsToFloat(code.w) * axes + origin;
+        b.even = b.even && int(code.z) - 1 == p.surface
+            && dot(unpack_direction(code.y), p.face_normal) > MIN_FACE_COSINE
+            && abs(dot(position - p.position, p.face_normal)) < PLANE_TOLERANCE * p.depth;
+    }
+    return b;
+}
+
+// Openness of the blocks that lie at this depth: the blur of the fixed tap pattern stops at edges.
+float openness(Blocks b, float depth) {
+    float sum = 0.0, total = 0.0;
+    for (int i = 0; i < 4; ++i) {
+        vec2 o = texelFetch(occlusion, b.at[i], 0).xy;
+        float d = (o.y - depth) / (0.02 * depth);
+        float w = (b.share[i] + 1e-3) / (1e-3 + d * d);
         sum += w * o.x;
         total += w;
     }
     return sum / total;
+}
+
+// Share of a light that arrives, between the blocks' samples; more than 1 where that must be found here.
+float interpolated(Blocks b, int light) {
+    int row = light * textureSize(occlusion, 0).y;
+    float sum = 0.0, most = b.even && light < block_lights ? 0.0 : 2.0;
+    for (int i = 0; i < 4; ++i) {
+        float lit = texelFetch(lit_blocks, b.at[i] + ivec2(0, row), 0).r;
+        sum += b.share[i] * lit;
+        most = max(most, lit);
+    }
+    return most > 1.0 ? 2.0 : sum;
 }
 
 #if LOBES
@@ -132,73 +173,121 @@ vec3 seen_through(Sample p, Surface s, vec3 n, vec3 v) {
 }
 #endif
 
-vec3 radiance(Sample p, Surface s, Matter m, float spread) {
-    vec3 v = normalize(origin - p.position);
-    vec3 n = normalize(m.normal);
-    float alpha2 = min(m.alpha2 + 2.0 * spread, 1.0), alpha = sqrt(alpha2);
-    vec3 diffuse = m.albedo * ((1.0 - m.metallic) * (1.0 - s.specular));
-    float nv = max(abs(dot(n, v)), 1e-3);
-#if GLASS
-    diffuse *= 1.0 - s.transmission;
-#endif
+// What a surface reflects of light from anywhere, at one point and seen from one side.
+struct Reflector {
+    vec3 n, v, r;         // normal, to the viewer, mirrored viewer
+    vec3 diffuse;         // albedo of the body
+    vec3 f0;
+    float alpha, alpha2;  // GGX
+    vec3 rebound;         // what one bounce between microfacets loses, given back (Turquin 2019)
+    vec3 mirror;          // share of even surroundings that the GGX lobe reflects
 #if LOBES
     // The layers above take their share of what arrives at those below.
-    vec2 coat_share = mirror_share(sqrt(s.clearcoat_alpha), nv);
-    float coat = s.clearcoat * (COAT_F0 * coat_share.x + coat_share.y);
-    float cloth = s.sheen * fuzz_share(nv);
-    float below = (1.0 - coat) * (1.0 - cloth);
-    vec3 through = diffuse * s.translucency * below;
-    diffuse *= 1.0 - s.translucency;
+    float coat, coated, coat_alpha, sheen, cloth, below;
+    vec3 through;         // diffuse light that leaves on the other side
 #endif
-    vec3 f0 = mix(vec3(s.specular), m.albedo, m.metallic);
-    vec2 share = mirror_share(sqrt(alpha), nv);
-    // What one bounce between microfacets loses, given back (Turquin 2019).
-    vec3 rebound = 1.0 + f0 * (1.0 / max(share.x + share.y, 0.1) - 1.0);
-    vec3 mirror = f0 * share.x + min(share.y, 50.0 * max(f0.r, max(f0.g, f0.b)));
-    vec3 r = reflect(-v, n);
-    vec3 sum = vec3(0);
-    for (int i = 0; i < light_count; ++i) {
-        Light light = light_at(i);
-        bool area = light.kind == AREA;
-        vec3 to_light = light.kind == SUN ? -light.direction : light.position - p.position;
-        float distance_m = length(to_light);
-        vec3 l = to_light / distance_m;
-        float ahead = dot(p.face_normal, l);
-        float nl = dot(n, l);
-        float angular = light.kind == SUN ? light.radius_m : light.radius_m / max(distance_m, light.radius_m);
-        float wide = min(sqrt(alpha2 + 0.25 * angular * angular), 1.0);
-        vec3 arrives = arriving(light, l, distance_m) * smoothstep(-0.15, 0.0, ahead);
-        vec3 direct = (diffuse * (max(nl, 0.0) / PI) + rebound * reflected(f0, wide, n, v, l)) * arrives;
-        if (area) {
-            bool faces = dot(to_light, light.direction) < 0.0;
-            direct = faces ? light.colour * (diffuse * form_factor(light, p.position, n, 5)
-                                             + rebound * mirror * mirror_form(light, p.position, r, alpha)) : vec3(0);
-        }
-#if LOBES
-        float coat_wide = min(sqrt(s.clearcoat_alpha * s.clearcoat_alpha + 0.25 * angular * angular), 1.0);
-        float coated = s.clearcoat * (1.0 - cloth);
-        vec3 layers = (coated * reflected(vec3(COAT_F0), coat_wide, n, v, l) + s.sheen * fuzz(n, v, l)) * arrives;
-        if (area) {
-            bool faces = dot(to_light, light.direction) < 0.0;
-            float mirror_part = coat * (1.0 - cloth) * mirror_form(light, p.position, r, s.clearcoat_alpha);
-            layers = faces ? light.colour * (mirror_part + cloth * form_factor(light, p.position, n, 5)) : vec3(0);
-        }
-        direct = direct * below + layers;
-        direct += through * (area ? light.colour * form_factor(light, p.position, -n, dot(to_light, light.direction) < 0.0 ? 5 : 0)
-                                  : arriving(light, l, distance_m) * (smoothstep(-0.15, 0.0, -ahead) * max(-nl, 0.0) / PI));
-#endif
-        bool wanted = max(direct.r, max(direct.g, direct.b)) > 0.0;
-        sum += direct * visibility(light, p.position, p.face_normal, wanted);
-    }
-    vec3 surroundings = cube(ambient_sides, n) * diffuse + rebound * mirror * mirrored(p.position, r, alpha);
-#if LOBES
-    surroundings = surroundings * below + coat * (1.0 - cloth) * mirrored(p.position, r, s.clearcoat_alpha)
-                 + cloth * cube(ambient_sides, n) + through * cube(ambient_sides, -n);
-#endif
-    vec3 result = sum + openness(p.position, p.depth) * surroundings;
+};
+
+Reflector reflector_of(Sample p, Surface s, Matter m, float spread) {
+    Reflector b;
+    b.v = normalize(origin - p.position);
+    b.n = normalize(m.normal);
+    b.r = reflect(-b.v, b.n);
+    b.alpha2 = min(m.alpha2 + 2.0 * spread, 1.0);
+    b.alpha = sqrt(b.alpha2);
+    b.diffuse = m.albedo * ((1.0 - m.metallic) * (1.0 - s.specular));
+    float nv = max(abs(dot(b.n, b.v)), 1e-3);
 #if GLASS
-    float passes = s.transmission * (1.0 - m.metallic) * (1.0 - mirror.g) * (1.0 - mirror.g);
-    result += passes * m.albedo * seen_through(p, s, n, v);
+    b.diffuse *= 1.0 - s.transmission;
+#endif
+#if LOBES
+    vec2 coat_share = mirror_share(sqrt(s.clearcoat_alpha), nv);
+    b.coat_alpha = s.clearcoat_alpha;
+    b.sheen = s.sheen;
+    b.cloth = s.sheen * fuzz_share(nv);
+    b.coated = s.clearcoat * (1.0 - b.cloth);
+    float coat = s.clearcoat * (COAT_F0 * coat_share.x + coat_share.y);
+    b.below = (1.0 - coat) * (1.0 - b.cloth);
+    b.coat = coat * (1.0 - b.cloth);
+    b.through = b.diffuse * s.translucency * b.below;
+    b.diffuse *= 1.0 - s.translucency;
+#endif
+    b.f0 = mix(vec3(s.specular), m.albedo, m.metallic);
+    vec2 share = mirror_share(sqrt(b.alpha), nv);
+    b.rebound = 1.0 + b.f0 * (1.0 / max(share.x + share.y, 0.1) - 1.0);
+    b.mirror = b.rebound * (b.f0 * share.x + min(share.y, 50.0 * max(b.f0.r, max(b.f0.g, b.f0.b))));
+    return b;
+}
+
+// What of a light's radiance or intensity leaves towards the viewer, shadows aside.
+vec3 returned(Light light, Sample p, Reflector b) {
+    vec3 to_light = light.kind == SUN ? -light.direction : light.position - p.position;
+    float distance_m = max(length(to_light), 1e-6);
+    vec3 l = to_light / distance_m;
+    float ahead = dot(p.face_normal, l), nl = dot(b.n, l);
+    float angular = light.kind == SUN ? light.radius_m : light.radius_m / max(distance_m, light.radius_m);
+    float wide = min(sqrt(b.alpha2 + 0.25 * angular * angular), 1.0);
+    vec3 unhindered = arriving(light, l, distance_m);
+    vec3 arrives = unhindered * smoothstep(-0.15, 0.0, ahead);
+    vec3 result = (b.diffuse * (max(nl, 0.0) / PI) + b.rebound * reflected(b.f0, wide, b.n, b.v, l)) * arrives;
+#if LOBES
+    float coat_wide = min(sqrt(b.coat_alpha * b.coat_alpha + 0.25 * angular * angular), 1.0);
+    result = result * b.below + b.through * unhindered * (smoothstep(-0.15, 0.0, -ahead) * max(-nl, 0.0) / PI)
+        + (b.coated * reflected(vec3(COAT_F0), coat_wide, b.n, b.v, l) + b.sheen * fuzz(b.n, b.v, l)) * arrives;
+#endif
+#if AREAS
+    bool area = light.kind == AREA;
+    int edges = area && dot(to_light, light.direction) < 0.0 ? 5 : 0;
+    float front = form_factor(light, p.position, b.n, edges);
+    vec3 from_area = b.diffuse * front + b.mirror * mirror_form(light, p.position, b.r, b.alpha);
+#if LOBES
+    from_area = from_area * b.below + b.coat * mirror_form(light, p.position, b.r, b.coat_alpha)
+        + b.cloth * front + b.through * form_factor(light, p.position, -b.n, edges);
+#endif
+    result = area ? edges > 0 ? light.colour * from_area : vec3(0) : result;
+#endif
+    return result;
+}
+
+// Light of all lights. First those whose shadow is interpolated; the others need their own, which costs much
+// more, one after the other: lights differ from pixel to pixel in that loop, so that it is short.
+vec3 lights_on(Sample p, Reflector b, Blocks blocks) {
+    vec3 sum = vec3(0);
+    int i = 0;
+    do {
+        int first = i;
+        uint left = 0u;
+        do {
+            vec3 light = returned(light_at(i), p, b);
+            bool wanted = i < light_count && max(light.r, max(light.g, light.b)) > 0.0;
+            float lit = interpolated(blocks, i);
+            left |= wanted && lit > 1.0 ? 1u << (i - first) : 0u;
+            sum += wanted && lit <= 1.0 ? lit * light : vec3(0);
+        } while (++i < min(light_count, first + 32));
+        do {
+            bool wanted = left != 0u;
+            Light light = light_at(first + (wanted ? findLSB(left) : 0));
+            float even_m, lit = visibility(light, p.position, p.face_normal, wanted, even_m);
+            sum += wanted ? lit * returned(light, p, b) : vec3(0);
+            left &= left - 1u;
+        } while (left != 0u);
+    } while (i < light_count);
+    return sum;
+}
+
+vec3 radiance(Sample p, Surface s, Matter m, float spread) {
+    Reflector b = reflector_of(p, s, m, spread);
+    Blocks blocks = blocks_around(p);
+    vec3 surroundings = cube(ambient_sides, b.n) * b.diffuse + b.mirror * mirrored(p.position, b.r, b.alpha);
+#if LOBES
+    surroundings = surroundings * b.below + b.coat * mirrored(p.position, b.r, b.coat_alpha)
+                 + b.cloth * cube(ambient_sides, b.n) + b.through * cube(ambient_sides, -b.n);
+#endif
+    vec3 result = lights_on(p, b, blocks) + openness(blocks, p.depth) * surroundings;
+#if GLASS
+    float mirror = b.mirror.g / b.rebound.g;
+    float passes = s.transmission * (1.0 - m.metallic) * (1.0 - mirror) * (1.0 - mirror);
+    result += passes * m.albedo * seen_through(p, s, b.n, b.v);
 #endif
     return result;
 }
@@ -222,19 +311,19 @@ void main() {
     vec3 ray = local * axes;
     vec3 right = (ray_at(vec2(pixel) + vec2(1.5, 0.5)) - local) * axes;
     vec3 down = (ray_at(vec2(pixel) + vec2(0.5, 1.5)) - local) * axes;
-    int count = grid * grid, middle = (grid / 2) * (grid + 1);
-    uint open = (1u << count) - 1u;
+    uint open = (1u << COUNT) - 1u;
+    Sample all[COUNT];
+    for (int i = 0; i < COUNT; ++i) all[i] = sample_at(place_of(pixel, i));
 #if GLASS
-    // Where there is no glass nothing is shaded: loops over no samples and no lights are left at once.
-    for (int i = 0; i < count; ++i) open &= sample_at(place_of(pixel, i)).surface < 0 ? ~(1u << i) : ~0u;
+    for (int i = 0; i < COUNT; ++i) open &= all[i].surface < 0 ? ~(1u << i) : ~0u;
 #endif
     vec3 sum = vec3(0), albedo = vec3(0), relief = vec3(0);
     int id = 0;
     float covered = 0.0;
-    while (open != 0u) {
+    do {
         uint before = open;
         float members;
-        Sample p = next_group(pixel, open, members);
+        Sample p = next_group(all, open, members);
         bool hit = p.surface >= 0;
         Surface s = surface_at(max(p.surface, 0));
         float spread = 1.0 - min(length(p.normal), 1.0);
@@ -252,21 +341,21 @@ void main() {
         sum += members * (hit ? light : sky_at(ray));
 #endif
         albedo += hit ? members * m.albedo : vec3(0);
-        bool labels = ((before & ~open) & (1u << middle)) != 0u && hit;
+        bool labels = ((before & ~open) & (1u << MIDDLE)) != 0u && hit;
         relief = labels ? m.normal - turned : relief;
         id = labels ? s.object_id : id;
-    }
-    Sample label = sample_at(place_of(pixel, middle));
+    } while (open != 0u);
+    Sample label = all[MIDDLE];
     vec2 corner = (vec2(pixel) + 0.5) / vec2(size) * 2.0 - 1.0;
     float r2 = dot(corner, corner * vec2(size * size)) / dot(vec2(size), vec2(size));
     float gain = max(1.0 + r2 * (vignetting.x + r2 * (vignetting.y + r2 * vignetting.z)), 0.0);
-    out_radiance = vec4(sum * (gain / float(count)), label.surface >= 0 ? label.depth : 0.0);
-    out_albedo = vec4(albedo / float(count), float(id) / 65535.0);
+    out_radiance = vec4(sum * (gain / float(COUNT)), label.surface >= 0 ? label.depth : 0.0);
+    out_albedo = vec4(albedo / float(COUNT), float(id) / 65535.0);
     vec3 normal = dot(label.normal, label.face_normal) < 0.0 ? -label.normal : label.normal;
     normal = axes * normalize(normal + relief) * vec3(1, 1, -1);
     out_normal = vec4(0.5 + 0.5 * (label.surface >= 0 ? normal : vec3(0, 0, 1)), 0.0);
 #if GLASS
-    float bare = 1.0 - covered / float(count);
+    float bare = 1.0 - covered / float(COUNT);
     vec4 far = texelFetch(behind, pixel, 0), far_albedo = texelFetch(behind_albedo, pixel, 0);
     out_radiance.rgb += bare * far.rgb;
     out_albedo.rgb += bare * far_albedo.rgb;

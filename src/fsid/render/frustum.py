@@ -1,0 +1,87 @@
+"""What can be seen at all, so that nothing else is drawn: all answers err on the side of seeing.
+
+in_view       spheres in a pyramid
+rectangles    parts of an image that hold spheres
+seen_tiles    tiles of shadow maps that a lens can look into
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fsid.render.camera import Lens
+from fsid.render.shadows import Tile
+
+
+def in_view(
+    spheres: np.ndarray, origin: np.ndarray, axes: np.ndarray, tan_xy: tuple[float, float]
+) -> np.ndarray:
+    """(N,) bool: spheres that touch the pyramid from `origin` along axes[2] (rows right, up, forward)."""
+    local = (spheres[:, :3] - origin) @ axes.T
+    radius = spheres[:, 3]
+    inside = local[:, 2] > -radius
+    for axis in (0, 1):
+        beyond = np.abs(local[:, axis]) - tan_xy[axis] * local[:, 2]
+        inside &= beyond < radius * np.hypot(1.0, tan_xy[axis])
+    return inside
+
+
+def rectangles(
+    spheres: np.ndarray,
+    origin: np.ndarray,
+    axes: np.ndarray,
+    focal: tuple[float, float],
+    shift: tuple[float, float],
+    size: tuple[int, int],
+) -> list[tuple[int, int, int, int]]:
+    """(x, y, width, height) in pixels that hold the images of spheres, as `in_view`; where that would be more
+    than the image, and where one is around the eye, the whole image. focal, shift: half image sizes."""
+    whole = [(0, 0, *size)]
+    found = []
+    local = (spheres[:, :3] - origin) @ axes.T * (1, -1, 1)
+    for centre, radius in zip(local, spheres[:, 3], strict=True):
+        if centre[2] <= 1.01 * radius:
+            return whole
+        depths = centre[2] + radius * np.array([[-1.0], [1.0]])
+        sides = np.stack([centre[:2] - radius, centre[:2] + radius])[:, None] / depths
+        ndc = sides.reshape(4, 2) * focal + shift
+        low = np.clip(np.floor((ndc.min(0) * 0.5 + 0.5) * size) - 1, 0, size).astype(int)
+        high = np.clip(np.ceil((ndc.max(0) * 0.5 + 0.5) * size) + 1, 0, size).astype(int)
+        if (high > low).all():
+            found.append((int(low[0]), int(low[1]), int(high[0] - low[0]), int(high[1] - low[1])))
+    return found if sum(w * h for _, _, w, h in found) < size[0] * size[1] else whole
+
+
+def seen_tiles(tiles: Sequence[Tile], lens: Lens, shift: tuple[float, float], deepest_m: float) -> list[Tile]:
+    """The tiles in which something that the lens sees can lie; no other is ever looked up.
+
+    shift: as in `Shot.seen_shift`. deepest_m: no surface is farther from the lens than this. Two pyramids are
+    apart where a side of one has the other wholly behind it.
+    """
+    corners = np.array([(x, y) for x in (-1.0, 1.0) for y in (-1.0, 1.0)])
+    tangents = (corners - shift) / lens.seen_focal * (1, -1)
+    rays = np.column_stack([tangents, np.ones(4)]) @ lens.rotation
+    eye = np.vstack([lens.position, lens.position + deepest_m * rays])
+    return [tile for tile in tiles if tile.range_m > 0 or not _apart(tile, eye, rays)]
+
+
+def _apart(tile: Tile, eye: np.ndarray, rays: np.ndarray) -> bool:
+    """eye: (5, 3) apex and far corners of what is seen; rays: (4, 3) its edges."""
+    half = 1.0 / tile.focal
+    corners = np.array([(x, y, 1.0) for x in (-half, half) for y in (-half, half)]) @ tile.axes
+    return _behind(eye, tile.origin, corners) or _behind(
+        np.vstack([tile.origin, tile.origin + corners * 1e4]), eye[0], rays
+    )
+
+
+def _behind(points: np.ndarray, apex: np.ndarray, edges: np.ndarray) -> bool:
+    """Whether all points lie behind one side of a pyramid, whose edges are those of corners 00 01 10 11."""
+    middle = edges.sum(0)
+    for i, j in ((0, 1), (1, 3), (3, 2), (2, 0)):
+        inward = np.cross(edges[i], edges[j])
+        inward = inward if inward @ middle > 0 else -inward
+        if ((points - apex) @ inward < 0).all():
+            return True
+    return False
