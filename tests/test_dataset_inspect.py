@@ -59,6 +59,21 @@ def test_more_colours_give_more_entropy_and_coverage():
         assert colourful[name].mean() > grey[name].mean(), name
 
 
+def test_colour_of_things_and_colour_of_texture_are_told_apart():
+    """Two plain halves of different hue, and a pixel-wise mixture of the same two colours."""
+    colours = np.array([(0.7, 0.4, 0.4), (0.4, 0.5, 0.7)], np.float32)
+    halves = colours[(np.indices((96, 96))[1] >= 48).astype(int)]
+    mixed = colours[np.random.default_rng(0).integers(2, size=(96, 96))]
+    things, texture = measure(halves), measure(mixed)
+    assert things["colour_regions"] > 5 * texture["colour_regions"]
+    assert np.median(texture["colour_texture"]) > np.median(things["colour_texture"]) - 1e-6
+    assert np.median(texture["colour_texture"]) > 0.3
+    lighter = measure(
+        np.float32(0.3) + 0.4 * np.random.default_rng(1).random((96, 96, 1)).astype(np.float32).repeat(3, 2)
+    )
+    assert np.median(lighter["colour_texture"]) < -1
+
+
 def test_distance_is_zero_for_equal_sets_and_one_for_a_shift_by_a_standard_deviation():
     values = np.random.default_rng(2).normal(3, 2, 4000)
     assert distance(values, values) == 0

@@ -50,6 +50,8 @@ TITLES: Mapping[str, str] = MappingProxyType(
         "colourfulness": "colourfulness (Hasler and Suesstrunk 2003)",
         "ab_coverage": "covered cells of the a*b* plane",
         "colour_entropy": "patch-colour entropy, bits",
+        "colour_regions": "spread of patch colours within a picture, a*b*",
+        "colour_texture": "colour of texture (patch RMS of a*b* / of L*), log10",
     }
 )
 
@@ -172,6 +174,19 @@ def _colours(image: np.ndarray) -> dict[str, np.ndarray]:
         "colourfulness": _one(colourfulness),
         "ab_coverage": _one((counts > AB_SHARE * counts.sum()).sum()),
         "colour_entropy": np.quantile(entropy, _LEVELS),
+        **_colour_scales(lab),
+    }
+
+
+def _colour_scales(lab: np.ndarray) -> dict[str, np.ndarray]:
+    """How much colour differs between patches, and within them: in photographs hue belongs to things and
+    lightness to their texture."""
+    patches = np.stack([_blocks(lab[..., i], PATCH_PX).reshape(-1, PATCH_PX**2) for i in range(3)])
+    spread = np.sqrt(patches.mean(2)[1:].var(1).sum())
+    light, *colour = patches.var(2)
+    return {
+        "colour_regions": _one(spread),
+        "colour_texture": np.quantile(0.5 * np.log10((sum(colour) + 0.01) / (light + 0.01)), _LEVELS),
     }
 
 
