@@ -72,7 +72,7 @@ A bake takes tenths of a second, so it is kept in a folder: `$FSID_CACHE`, else 
 `~/.cache/fsid`. `FSID_CACHE=off` keeps nothing. The result is the same with and without: maps are rounded
 (8 bit, height 16 bit) before they are returned, not only when they are stored. The name of an entry holds a
 hash of the sources that made it and of the versions of NumPy, SciPy, Pillow and Matplotlib, so an entry
-cannot be stale; the folder stays below 2 GiB, what was used longest ago leaves first; a damaged entry is
+cannot be stale; the folder stays below 4 GiB, what was used longest ago leaves first; a damaged entry is
 baked again; any number of processes may share it. Deleting it costs time and nothing else.
 """
 

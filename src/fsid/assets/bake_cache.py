@@ -144,36 +144,39 @@ def unpack(packed: Arrays, size: int) -> MaterialMaps:
 def _read(path: Path) -> Arrays:
     """The arrays of a file; every byte of them is checked by the archive's CRC-32."""
     with zipfile.ZipFile(path) as archive:
-        members = {name.removesuffix(".npy"): archive.read(name) for name in archive.namelist()}
-    return {
-        name: np.lib.format.read_array(BytesIO(data), allow_pickle=False) for name, data in members.items()
-    }
+        return {name.removesuffix(".npy"): _array(archive.read(name)) for name in archive.namelist()}
+
+
+def _array(member: bytes) -> np.ndarray:
+    """The array of an .npy file, where it lies. Raises ValueError for one that would have to be unpickled."""
+    file = BytesIO(member)
+    np.lib.format.read_magic(file)
+    shape, _, dtype = np.lib.format.read_array_header_1_0(file)
+    return np.frombuffer(member, dtype, offset=file.tell()).reshape(shape)
 
 
 def _write(path: Path, arrays: Arrays, worth: float) -> None:
-    buffer = BytesIO()
-    with zipfile.ZipFile(buffer, "w", compresslevel=1) as archive:
-        for name, array in arrays.items():
-            member = BytesIO()
-            np.lib.format.write_array(member, array, allow_pickle=False)
-            kind = zipfile.ZIP_DEFLATED if _deflates(array, worth) else zipfile.ZIP_STORED
-            archive.writestr(f"{name}.npy", member.getbuffer(), kind)
     part = None
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, part = tempfile.mkstemp(suffix=".part", dir=path.parent)
-        with os.fdopen(handle, "wb") as file:
-            file.write(buffer.getbuffer())
+        with os.fdopen(handle, "wb") as file, zipfile.ZipFile(file, "w", compresslevel=1) as archive:
+            for name, array in arrays.items():
+                member = BytesIO()
+                np.lib.format.write_array(member, np.ascontiguousarray(array), (1, 0), allow_pickle=False)
+                kind = zipfile.ZIP_DEFLATED if _deflates(array, worth) else zipfile.ZIP_STORED
+                archive.writestr(f"{name}.npy", member.getbuffer(), kind)
+        size_bytes = os.path.getsize(part)
         os.replace(part, path)
-        _count(path.parent, len(buffer.getbuffer()))
+        _count(path.parent, size_bytes)
     except OSError:
         if part is not None:
             Path(part).unlink(missing_ok=True)
 
 
 def _deflates(array: np.ndarray, worth: float) -> bool:
-    """Whether the first eighth of an array deflates to less than `worth` of itself."""
-    sample = np.ascontiguousarray(array).reshape(-1)[: -(-array.size // 8)].tobytes()
+    """Whether the first 32nd of an array deflates to less than `worth` of itself."""
+    sample = array.reshape(-1)[: -(-array.size // 32)].tobytes()
     return len(zlib.compress(sample, 1)) < worth * len(sample)
 
 
