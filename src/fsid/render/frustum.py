@@ -2,16 +2,14 @@
 
 in_view       spheres in a pyramid
 rectangles    parts of an image that hold spheres
-seen_tiles    tiles of shadow maps that a lens can look into
+sees          whether a lens can look into a tile of a shadow map
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from fsid.render.camera import Lens
+from fsid.render.exposure import Shot
 from fsid.render.shadows import Tile
 
 
@@ -54,17 +52,18 @@ def rectangles(
     return found if sum(w * h for _, _, w, h in found) < size[0] * size[1] else whole
 
 
-def seen_tiles(tiles: Sequence[Tile], lens: Lens, shift: tuple[float, float], deepest_m: float) -> list[Tile]:
-    """The tiles in which something that the lens sees can lie; no other is ever looked up.
+def sees(shot: Shot, tile: Tile, deepest_m: float) -> bool:
+    """Whether anything that is seen can lie in the tile; no other tile is ever looked up.
 
-    shift: as in `Shot.seen_shift`. deepest_m: no surface is farther from the lens than this. Two pyramids are
-    apart where a side of one has the other wholly behind it.
+    deepest_m: no surface is farther from the lens than this. Two pyramids are apart where a side of one has
+    the other wholly behind it.
     """
+    lens = shot.lens
     corners = np.array([(x, y) for x in (-1.0, 1.0) for y in (-1.0, 1.0)])
-    tangents = (corners - shift) / lens.seen_focal * (1, -1)
+    tangents = (corners - shot.seen_shift) / lens.seen_focal * (1, -1)
     rays = np.column_stack([tangents, np.ones(4)]) @ lens.rotation
     eye = np.vstack([lens.position, lens.position + deepest_m * rays])
-    return [tile for tile in tiles if tile.range_m > 0 or not _apart(tile, eye, rays)]
+    return tile.range_m > 0 or not _apart(tile, eye, rays)
 
 
 def _apart(tile: Tile, eye: np.ndarray, rays: np.ndarray) -> bool:

@@ -20,11 +20,12 @@ _STEP_LAYERS = 16
 
 @dataclass(frozen=True)
 class Layer:
-    """index: in the texture arrays. slope_scale and shares as in `Texels`."""
+    """index: in the texture arrays. slope_scale and shares as in `Texels`. roughness: its mean."""
 
     index: int
     slope_scale: float
     shares: np.ndarray
+    roughness: float
 
 
 class LayerStore:
@@ -85,4 +86,4 @@ class LayerStore:
         for array, data in zip(self._arrays, texels.data, strict=True):
             array.write(slot, data)
         self._context.finish()  # or drivers keep the uploads of a whole scene
-        return Layer(slot, texels.slope_scale, texels.shares)
+        return Layer(slot, texels.slope_scale, texels.shares, float(texels.data[0][-1, 3]) / 255)

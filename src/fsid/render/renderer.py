@@ -12,7 +12,7 @@ what is resident (texture slots) are addressed by whole numbers, and everything 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import Any, ClassVar, Self
 
@@ -27,10 +27,11 @@ from fsid.render.drawable import BACKGROUND_ID, Drawable, View, view_of
 from fsid.render.exposure import Shot, shots_of
 from fsid.render.flow import flow_between
 from fsid.render.frame import Frame
-from fsid.render.frustum import in_view, rectangles, seen_tiles
+from fsid.render.frustum import in_view, rectangles, sees
 from fsid.render.geometry import Geometry, draw_commands, merge
 from fsid.render.lamps import lamps_of
 from fsid.render.layers import Layer, LayerStore
+from fsid.render.mirror import mirror_shot
 from fsid.render.programs import load_program
 from fsid.render.quality import QUALITIES, tap_table
 from fsid.render.reflectance import reflectance_table
@@ -40,10 +41,27 @@ from fsid.render.shadows import ShadowPlan, Source, plan_shadows
 from fsid.render.sky import panorama
 from fsid.render.targets import Place, ShadowAtlas, Targets
 from fsid.render.texels import Bake, bake_texels
-from fsid.scene.model import Material, Scene
+from fsid.scene.model import ZERO, Material, Scene
 
 Mark = Callable[[str], None]
 """Called with the name of each stage when it has been issued; the benchmark measures with it."""
+
+
+_CLIP_DISTANCE0 = 0x3000
+_FAR_M = 1e9
+_ABOVE_GROUND_M = 0.0005
+
+
+@dataclass(frozen=True)
+class _Stage:
+    """A view as the passes need it: on the device, with its lights and surroundings."""
+
+    view: View
+    geometry: Geometry
+    plan: ShadowPlan
+    room: Room
+    sky: np.ndarray | None
+    buffers: Buffers
 
 
 class Renderer:
@@ -98,8 +116,9 @@ class Renderer:
         self._shadow_blocks = load_program(
             context, "screen.vert", "shadow_blocks.frag", LENS=0, GRID=self._grid
         )
-        self._shades: dict[tuple[int, bool, bool, bool], moderngl.Program] = {}
+        self._shades: dict[tuple[int, bool, bool, bool, bool], moderngl.Program] = {}
         self._targets = Targets(context, self._grid)
+        self._mirror_targets = Targets(context, self._grid)
         self._atlas = ShadowAtlas(context)
         taps = tap_table(self._quality)
         self._taps = context.texture((taps.shape[1], taps.shape[0]), 2, taps.tobytes(), dtype="f4")
@@ -207,43 +226,66 @@ class Renderer:
         )
         sky = None if view.sky is None else panorama(view.sky)
         room = light_sky(sky) if sky is not None else _lit_room(view, sources, albedo_of)
-        camera = view.camera
+        below = mirror_shot(view, shot, lambda m: layers[m.family, m.variant].roughness * m.roughness_scale)
         mark("scene build")
-        self._targets.resize((camera.width, camera.height), shot.lens.seen_px)
+        self._targets.resize((view.camera.width, view.camera.height), shot.lens.seen_px)
         self._atlas.resize(plan.size)
         buffers = Buffers(self._context, geometry, plan, room, sky)
         try:
             mark("upload")
-            self._draw_shadows(geometry, plan, shot, buffers, casts)
+            stage = _Stage(view, geometry, plan, room, sky, buffers)
+            self._draw_shadows(stage, [shot] if below is None else [shot, below], casts)
             mark("shadows")
+            if below is not None:
+                self._draw_mirror(stage, below)
+                mark("mirror")
+            targets = self._targets
             glass = np.array([drawable.is_glass for drawable in view.drawables])
-            self._draw_samples(geometry, shot, buffers, np.ones_like(glass), layer=0)
+            self._draw_samples(targets, stage, shot, np.ones_like(glass), layer=0)
             mark("samples")
-            self._draw_occlusion(shot, buffers)
+            self._draw_occlusion(targets, stage, shot)
             mark("occlusion")
-            self._draw_shadow_blocks(view, shot, plan, buffers)
-            self._targets.begin_shading()
-            self._shade(view, shot, plan, room, sky, buffers, glass=False)
+            self._draw_shadow_blocks(targets, stage, shot)
+            targets.begin_shading()
+            if below is not None:
+                self._mirror_targets.use_mirror(11)
+            self._shade(targets, stage, shot, planar=below is not None)
             if glass.any():
-                self._draw_samples(geometry, shot, buffers, glass, layer=1)
-                self._targets.begin_glass(_places(geometry.spheres[glass], shot, self._targets.size))
-                self._shade(view, shot, plan, room, sky, buffers, glass=True)
-                self._targets.end_glass()
-                self._targets.draw(lambda: buffers.draw_screen(self._copy))
+                self._draw_samples(targets, stage, shot, glass, layer=1)
+                targets.begin_glass(_places(geometry.spheres[glass], shot, targets.size))
+                self._shade(targets, stage, shot, glass=True)
+                targets.end_glass()
+                targets.draw(lambda: buffers.draw_screen(self._copy))
             self._context.finish()
             mark("shading")
         finally:
             buffers.release()
 
-    def _draw_shadows(
-        self, geometry: Geometry, plan: ShadowPlan, shot: Shot, buffers: Buffers, casts: np.ndarray
-    ) -> None:
-        reach = np.linalg.norm(geometry.spheres[:, :3] - shot.lens.position, axis=1) + geometry.spheres[:, 3]
+    def _draw_mirror(self, stage: _Stage, below: Shot) -> None:
+        """The image that smooth ground shows, with what lies below the ground cut off."""
+        targets, size = self._mirror_targets, below.lens.seen_px
+        targets.resize(size, size)
+        camera = replace(stage.view.camera, width=size[0], vignetting=ZERO, chromatic_aberration=(0.0, 0.0))
+        stage = replace(stage, view=replace(stage.view, camera=camera))
+        every = np.ones(len(stage.geometry.ranges), bool)
+        self._draw_samples(targets, stage, below, every, layer=0, lowest_m=_ABOVE_GROUND_M)
+        self._draw_occlusion(targets, stage, below)
+        self._draw_shadow_blocks(targets, stage, below)
+        targets.begin_shading()
+        self._shade(targets, stage, below, shining=False)
+
+    def _draw_shadows(self, stage: _Stage, shots: Sequence[Shot], casts: np.ndarray) -> None:
+        geometry, plan, buffers = stage.geometry, stage.plan, stage.buffers
+        centres, radii = geometry.spheres[:, :3], geometry.spheres[:, 3]
+        deepest = float((np.linalg.norm(centres - shots[0].lens.position, axis=1) + radii).max())
+        deepest += 2 * abs(float(shots[0].lens.position[2]))
         self._context.enable_only(moderngl.DEPTH_TEST)
         self._atlas.begin()
         array = buffers.vertex_array(self._depth)
         _set(self._depth, near=SHADOW_NEAR_M)
-        for tile in seen_tiles(plan.tiles, shot.lens, shot.seen_shift, float(reach.max())):
+        for tile in plan.tiles:
+            if not any(sees(shot, tile, deepest) for shot in shots):
+                continue
             tangent = 1.0 / tile.focal
             seen = casts.copy()
             if tile.range_m == 0:
@@ -259,9 +301,18 @@ class Renderer:
         self._atlas.end_moments()
 
     def _draw_samples(
-        self, geometry: Geometry, shot: Shot, buffers: Buffers, which: np.ndarray, *, layer: int
+        self,
+        targets: Targets,
+        stage: _Stage,
+        shot: Shot,
+        which: np.ndarray,
+        *,
+        layer: int,
+        lowest_m: float = -_FAR_M,
     ) -> None:
-        """The G-buffer of drawables; layer: 0 of what is opaque, 1 of glass in front of that."""
+        """The G-buffer of drawables, of what is higher than lowest_m; layer: 0 of what is opaque, 1 of glass
+        in front of that."""
+        geometry, buffers = stage.geometry, stage.buffers
         lens, shift = shot.lens, shot.seen_shift
         tangents = tuple((1 + abs(s)) / f for s, f in zip(shift, lens.seen_focal, strict=True))
         seen = np.flatnonzero(
@@ -274,15 +325,18 @@ class Renderer:
         focal = (lens.seen_focal[0], -lens.seen_focal[1])
         _set(self._visible, origin=lens.position, axes=lens.rotation.T, focal=focal, shift=shift, near=NEAR_M)
         self._context.enable_only(moderngl.DEPTH_TEST)
-        _set(self._visible, layer=layer)
-        self._targets.begin_samples(over=layer == 1)
+        _set(self._visible, layer=layer, lowest=lowest_m)
+        targets.begin_samples(over=layer == 1)
+        self._context.enable_direct(_CLIP_DISTANCE0)
         buffers.draw(buffers.vertex_array(self._visible), commands)
+        self._context.disable_direct(_CLIP_DISTANCE0)
 
-    def _draw_occlusion(self, shot: Shot, buffers: Buffers) -> None:
+    def _draw_occlusion(self, targets: Targets, stage: _Stage, shot: Shot) -> None:
+        buffers = stage.buffers
         self._context.enable_only(moderngl.NOTHING)
-        self._targets.begin_block_depth()
+        targets.begin_block_depth()
         buffers.draw_screen(self._block_depth)
-        blocks, lens = self._targets.blocks, shot.lens
+        blocks, lens = targets.blocks, shot.lens
         _set(
             self._occlusion,
             focal=lens.seen_focal,
@@ -290,21 +344,21 @@ class Renderer:
             size=blocks,
             shift=shot.seen_shift,
         )
-        self._targets.begin_occlusion()
+        targets.begin_occlusion()
         self._taps.use(7)
         buffers.draw_screen(self._occlusion)
         for back in (False, True):
             _set(self._blur, direction=(0, 1) if back else (1, 0), size=blocks)
-            self._targets.begin_blur(back=back)
+            targets.begin_blur(back=back)
             buffers.draw_screen(self._blur)
 
-    def _draw_shadow_blocks(self, view: View, shot: Shot, plan: ShadowPlan, buffers: Buffers) -> None:
-        lens = shot.lens
+    def _draw_shadow_blocks(self, targets: Targets, stage: _Stage, shot: Shot) -> None:
+        lens, plan, buffers = shot.lens, stage.plan, stage.buffers
         _set(
             self._shadow_blocks,
-            blocks=self._targets.blocks,
-            through=_has_lobes(view),
-            seen=self._targets.seen,
+            blocks=targets.blocks,
+            through=_has_lobes(stage.view),
+            seen=targets.seen,
             seen_focal=lens.seen_focal,
             seen_shift=shot.seen_shift,
             axes=lens.rotation.T,
@@ -312,7 +366,7 @@ class Renderer:
         )
         self._use_shadows(self._shadow_blocks, plan)
         buffers.use()
-        self._targets.begin_shadow_blocks(plan.light_count)
+        targets.begin_shadow_blocks(plan.light_count)
         buffers.draw_screen(self._shadow_blocks)
 
     def _use_shadows(self, program: moderngl.Program, plan: ShadowPlan) -> None:
@@ -328,23 +382,23 @@ class Renderer:
 
     def _shade(
         self,
-        view: View,
+        targets: Targets,
+        stage: _Stage,
         shot: Shot,
-        plan: ShadowPlan,
-        room: Room,
-        sky: np.ndarray | None,
-        buffers: Buffers,
         *,
-        glass: bool,
+        glass: bool = False,
+        planar: bool = False,
+        shining: bool = True,
     ) -> None:
+        view, plan, room, sky, buffers = stage.view, stage.plan, stage.room, stage.sky, stage.buffers
         lens, camera = shot.lens, view.camera
         pixel_rad = 2.0 / (lens.focal[0] * camera.width)
         level = -1.0 if sky is None else max(float(np.log2(pixel_rad * len(sky) / np.pi)), 0.0)
-        program = self._shade_program(lens.model, _has_lobes(view), _has_areas(view), glass)
+        program = self._shade_program(lens.model, _has_lobes(view), _has_areas(view), glass, planar)
         _set(
             program,
-            size=self._targets.size,
-            seen=self._targets.seen,
+            size=targets.size,
+            seen=targets.seen,
             focal=lens.focal,
             seen_focal=lens.seen_focal,
             seen_shift=shot.seen_shift,
@@ -354,7 +408,7 @@ class Renderer:
             axes=lens.rotation.T,
             origin=lens.position,
             light_count=plan.light_count,
-            block_lights=0 if glass else self._targets.block_lights,
+            block_lights=0 if glass else targets.block_lights,
             max_probes=self._quality.probes,
             ambient_sides=room.sides,
             mean_sides=room.radiance.mean((1, 2)),
@@ -363,6 +417,7 @@ class Renderer:
             sky_level=level,
             vignetting=camera.vignetting,
             magnification=1.0,
+            shining=float(shining),
         )
         self._layers.use(0, 1)
         self._use_shadows(program, plan)
@@ -371,10 +426,12 @@ class Renderer:
         red, blue = camera.chromatic_aberration
         for aberration, colours in _colour_passes(red, blue):
             _set(program, magnification=1.0 + aberration)
-            self._targets.draw(lambda: buffers.draw_screen(program), colours)
+            targets.draw(lambda: buffers.draw_screen(program), colours)
 
-    def _shade_program(self, lens_model: int, lobes: bool, areas: bool, glass: bool) -> moderngl.Program:
-        key = (lens_model, lobes, areas, glass)
+    def _shade_program(
+        self, lens_model: int, lobes: bool, areas: bool, glass: bool, planar: bool
+    ) -> moderngl.Program:
+        key = (lens_model, lobes, areas, glass, planar)
         if key not in self._shades:
             self._shades[key] = load_program(
                 self._context,
@@ -385,6 +442,7 @@ class Renderer:
                 LOBES=int(lobes),
                 AREAS=int(areas),
                 GLASS=int(glass),
+                PLANAR=int(planar),
             )
         return self._shades[key]
 

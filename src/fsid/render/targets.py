@@ -112,6 +112,12 @@ class Targets:
         self._open.use(9)
         self._drawn = (self._results[0], [(0, 0, *self.size)])
 
+    def use_mirror(self, unit: int) -> None:
+        """Bind radiance and depth, with mip levels, for what reflects them."""
+        radiance = self._results[0][1]
+        radiance.build_mipmaps()
+        radiance.use(unit)
+
     def begin_glass(self, places: Sequence[Place]) -> None:
         """Draw, in some places only, what goes over the result; units 11 to 13 hold the result so far."""
         if len(self._results) == 1:

@@ -4,7 +4,7 @@
 // inside a surface is one such group, one at an edge two or three. Output: the frame at its final size.
 // GRID: edge of the square of samples per pixel. LOBES: 1 with clearcoat, sheen and translucency. AREAS: 1 with
 // area lights. GLASS: 1 in the second pass, whose samples are glass alone and which looks what is behind up in
-// the result of the first.
+// the result of the first. PLANAR: 1 with an image of the scene as smooth ground in z = 0 reflects it.
 #include "encoding.glsl"
 #include "surfaces.glsl"
 #include "material.glsl"
@@ -18,6 +18,10 @@ uniform int block_lights;   // how many lights it holds
 layout(binding = 10) uniform sampler2D sky;   // equirectangular
 uniform float sky_level;  // mip level at which a texel of the sky is a pixel; -1 without sky
 uniform vec3 vignetting;
+uniform float shining;    // 1; 0 in the image that a mirror shows, where lights have highlights instead
+#if PLANAR
+layout(binding = 11) uniform sampler2D mirror_image;    // as out_radiance, with mips
+#endif
 #if GLASS
 layout(binding = 11) uniform sampler2D behind;          // as out_radiance
 layout(binding = 12) uniform sampler2D behind_albedo;   // as out_albedo
@@ -275,12 +279,54 @@ vec3 lights_on(Sample p, Reflector b, Blocks blocks) {
     return sum;
 }
 
+#if PLANAR
+// Metres from the ground to what is mirrored at a place of the mirror's image (0..1).
+float mirrored_at(vec2 at, float depth, float reach) {
+    ivec2 texels = textureSize(mirror_image, 0);
+    float far = texelFetch(mirror_image, clamp(ivec2(at * vec2(texels)), ivec2(0), texels - 1), 0).a;
+    return far > 0.0 ? max(far / depth - 1.0, 0.0) * reach : 1e3;
+}
+
+// The image of smooth ground at a point of it, in direction r: blurred as the things around need, near ones above
+// all, so that their edges do not glow into what is far behind them.
+vec3 ground_image(Sample p, vec3 r, float alpha) {
+    vec3 local = axes * (p.position - origin);
+    float reach = length(local), width = 2.0 * alpha * 0.5 * seen_focal.x;
+    vec2 at = seen_at(local / local.z) / vec2(seen);
+    float beyond = mirrored_at(at, local.z, reach);
+    vec2 aside = vec2(1.0, float(seen.x) / float(seen.y)) * min(width * beyond / (beyond + reach), 0.1);
+    float nearness = 1.0 / max(beyond, 1e-3);
+    for (int i = 0; i < 8; ++i) {
+        float turn = float(i) * 0.25 * PI;
+        vec2 step = aside * vec2(cos(turn), sin(turn)) * (0.5 + 0.5 * float(i & 1));
+        nearness += 1.0 / max(mirrored_at(at + step, local.z, reach), 1e-3);
+    }
+    float nearest = 9.0 / nearness;
+    vec3 there = axes * ((p.position + r * beyond) * vec3(1, 1, -1) - origin);
+    vec2 moved = clamp(seen_at(there / max(there.z, 1e-3)) / vec2(seen), 0.0, 1.0);
+    float texels = width * float(textureSize(mirror_image, 0).x) * nearest / (nearest + reach);
+    return textureLod(mirror_image, moved, log2(max(texels, 1.0))).rgb;
+}
+#endif
+
+// What comes from direction r, averaged over a lobe of width alpha: the room's walls or the sky; on smooth ground
+// the things that stand on it.
+vec3 surroundings_in(Sample p, vec3 r, float alpha) {
+    vec3 room = mirrored(p.position, r, alpha);
+#if PLANAR
+    bool ground = abs(p.position.z) < 0.002 && p.face_normal.z > 0.999;
+    float share = ground ? 1.0 - smoothstep(0.12, 0.25, alpha) : 0.0;
+    room = mix(room, ground_image(p, r, alpha), share);
+#endif
+    return room;
+}
+
 vec3 radiance(Sample p, Surface s, Matter m, float spread) {
     Reflector b = reflector_of(p, s, m, spread);
     Blocks blocks = blocks_around(p);
-    vec3 surroundings = cube(ambient_sides, b.n) * b.diffuse + b.mirror * mirrored(p.position, b.r, b.alpha);
+    vec3 surroundings = cube(ambient_sides, b.n) * b.diffuse + b.mirror * surroundings_in(p, b.r, b.alpha);
 #if LOBES
-    surroundings = surroundings * b.below + b.coat * mirrored(p.position, b.r, b.coat_alpha)
+    surroundings = surroundings * b.below + b.coat * surroundings_in(p, b.r, b.coat_alpha)
                  + b.cloth * cube(ambient_sides, b.n) + b.through * cube(ambient_sides, -b.n);
 #endif
     vec3 result = lights_on(p, b, blocks) + openness(blocks, p.depth) * surroundings;
@@ -295,7 +341,8 @@ vec3 radiance(Sample p, Surface s, Matter m, float spread) {
 vec3 sky_at(vec3 direction) {
     vec3 d = normalize(direction);
     vec2 uv = vec2(atan(d.y, d.x) / (2.0 * PI), acos(clamp(d.z, -1.0, 1.0)) / PI);
-    return sky_level < 0.0 ? vec3(0) : textureLod(sky, uv, sky_level).rgb;
+    vec3 walls = (1.0 - shining) * mirrored(origin, d, 0.0);    // seen in a mirror where there are none
+    return sky_level < 0.0 ? walls : textureLod(sky, uv, sky_level).rgb;
 }
 
 // How the position moves on the plane of the face to the next pixel in direction of `step`.
@@ -333,7 +380,7 @@ void main() {
         vec3 turned = front ? smooth_normal : -smooth_normal;
         m.normal = front ? m.normal : -m.normal;
         vec3 light = radiance(p, s, m, spread);
-        light += s.emission * m.albedo + (front ? s.glow : vec3(0));
+        light += shining * (s.emission * m.albedo + (front ? s.glow : vec3(0)));
 #if GLASS
         covered += hit ? members : 0.0;
         sum += hit ? members * light : vec3(0);
