@@ -4,8 +4,8 @@
 
 because p on the plane and the mirror image of what it reflects lie on one ray of the camera. `Background` has
 its ground, or the top of its table, at z = 0. The image is half as large, without glass and without what
-shines: lights have highlights of their own. It is made only where the ground is smooth enough to show any, and
-indoors: out of doors the ground is flat for a few metres only, and its reflection would end in a line.
+shines: lights have highlights of their own. It is made only where the ground is smooth enough to show any,
+and indoors: out of doors the ground is flat for a few metres only, and its reflection would end in a line.
 """
 
 from __future__ import annotations

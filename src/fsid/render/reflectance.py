@@ -10,6 +10,7 @@ shaders/lights.glsl, so that direct and surrounding light agree and the energy t
 from __future__ import annotations
 
 from functools import cache
+from importlib.resources import files
 
 import numpy as np
 
@@ -17,30 +18,48 @@ SIZE = 32
 _POINTS = 1024
 
 
+def lobe_table() -> np.ndarray:
+    """(32, 32, 4) float32: a, b, c, d of tools/fit_lobes.py, laid out as `reflectance_table`."""
+    with (files("fsid.render") / "lobes.npy").open("rb") as file:
+        return np.asarray(np.load(file, allow_pickle=False), np.float32)
+
+
 @cache
 def reflectance_table() -> np.ndarray:
     """(SIZE, SIZE, 2) float32 A and B at texel centres; row: roughness, column: cosine to the viewer."""
     centres = (np.arange(SIZE) + 0.5) / SIZE
-    i = np.arange(_POINTS)
-    u = (i + 0.5) / _POINTS
-    phi = 2 * np.pi * _radical_inverse(i)
     table = np.empty((SIZE, SIZE, 2), np.float32)
-    nv = centres[:, None]
-    v = np.sqrt(1 - nv * nv), nv
     for row, roughness in zip(table, centres, strict=True):
-        a2 = max(roughness, 0.05) ** 4
-        nh = np.sqrt((1 - u) / (1 + (a2 - 1) * u))
-        side = np.sqrt(np.maximum(1 - nh * nh, 0)) * np.cos(phi)
-        vh = np.maximum(v[0] * side + v[1] * nh, 0)
-        nl = 2 * vh * nh - nv
-        lit = nl > 0
-        nl = np.maximum(nl, 1e-6)
-        masking = nl * np.sqrt(nv * nv * (1 - a2) + a2) + nv * np.sqrt(nl * nl * (1 - a2) + a2)
-        weight = np.where(lit, 2 * nl * vh / (masking * nh), 0.0)
+        _, vh, weight = _half_vectors(roughness, centres[:, None])
         fresnel = (1 - vh) ** 5
         row[:, 0] = ((1 - fresnel) * weight).mean(1)
         row[:, 1] = (fresnel * weight).mean(1)
     return table
+
+
+def reflected_directions(roughness: float, nv: float) -> tuple[np.ndarray, np.ndarray]:
+    """(N, 3) unit directions that light comes from, x along the viewer's projection, z the normal; (N,) what
+    comes from each, without Fresnel."""
+    half, vh, weight = _half_vectors(roughness, np.array(nv))
+    v = np.array([np.sqrt(1 - nv * nv), 0.0, nv])
+    return (2 * vh[:, None] * half - v)[weight > 0], weight[weight > 0]
+
+
+def _half_vectors(roughness: float, nv: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(N, 3) half vectors of GGX; for nv (..., 1) their cosines to the viewer, and what each reflects."""
+    i = np.arange(_POINTS)
+    u = (i + 0.5) / _POINTS
+    phi = 2 * np.pi * _radical_inverse(i)
+    a2 = max(roughness, 0.05) ** 4
+    nh = np.sqrt((1 - u) / (1 + (a2 - 1) * u))
+    sine = np.sqrt(np.maximum(1 - nh * nh, 0))
+    vh = np.maximum(np.sqrt(1 - nv * nv) * (sine * np.cos(phi)) + nv * nh, 0)
+    nl = 2 * vh * nh - nv
+    lit = nl > 0
+    nl = np.maximum(nl, 1e-6)
+    masking = nl * np.sqrt(nv * nv * (1 - a2) + a2) + nv * np.sqrt(nl * nl * (1 - a2) + a2)
+    half = np.stack([sine * np.cos(phi), sine * np.sin(phi), nh], axis=-1)
+    return half, vh, np.where(lit, 2 * nl * vh / (masking * nh), 0.0)
 
 
 def _radical_inverse(i: np.ndarray) -> np.ndarray:

@@ -34,7 +34,7 @@ from fsid.render.layers import Layer, LayerStore
 from fsid.render.mirror import mirror_shot
 from fsid.render.programs import load_program
 from fsid.render.quality import QUALITIES, tap_table
-from fsid.render.reflectance import reflectance_table
+from fsid.render.reflectance import lobe_table, reflectance_table
 from fsid.render.room import Room, light_room, light_sky
 from fsid.render.shadows import NEAR_M as SHADOW_NEAR_M
 from fsid.render.shadows import ShadowPlan, Source, plan_shadows
@@ -124,7 +124,8 @@ class Renderer:
         self._taps = context.texture((taps.shape[1], taps.shape[0]), 2, taps.tobytes(), dtype="f4")
         self._taps.filter = (moderngl.NEAREST, moderngl.NEAREST)
         shares = reflectance_table()
-        self._reflectance = context.texture(shares.shape[1::-1], 2, shares.tobytes(), dtype="f4")
+        shares = np.concatenate([np.concatenate([shares, np.zeros_like(shares)], axis=-1), lobe_table()])
+        self._reflectance = context.texture(shares.shape[1::-1], 4, shares.tobytes(), dtype="f4")
         self._reflectance.repeat_x = self._reflectance.repeat_y = False
         for program in (self._block_depth, self._occlusion):
             _set(program, stride=2 * self._grid, taps=self._quality.occlusion_taps)

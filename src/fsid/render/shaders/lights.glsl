@@ -181,14 +181,14 @@ vec3 arriving(Light light, vec3 to_light, float distance_m) {
     return light.colour * (cone / (reach * reach));
 }
 
-// Integral of cos(theta) / pi over a rectangle above the horizon of n (Lambert 1760, as summed over edges by
-// Baum et al. 1989), seen from `position`.
-vec3 corner_of(Light light, vec3 centre, int i) {
+// Integral of cos(theta) / pi around z over a rectangle above the horizon (Lambert 1760, as summed over edges by
+// Baum et al. 1989), seen from `position`, its directions bent by `bend`.
+vec3 corner_of(Light light, vec3 centre, mat3 bend, int i) {
     float x = i == 1 || i == 2 ? 1.0 : -1.0, y = i == 2 || i == 3 ? 1.0 : -1.0;
-    return centre + x * light.half_width + y * light.half_height;
+    return bend * (centre + x * light.half_width + y * light.half_height);
 }
 
-float form_factor(Light light, vec3 position, vec3 n, int edges) {
+float form_factor(Light light, vec3 position, mat3 bend, int edges) {
     vec3 centre = light.position - position;
     vec3 leaves = vec3(0), returns = vec3(0);
     float sum = 0.0;
@@ -196,37 +196,26 @@ float form_factor(Light light, vec3 position, vec3 n, int edges) {
     int i = 0;
     do {
         bool side = i < 4;     // the last edge closes what the horizon cuts
-        vec3 a = side ? corner_of(light, centre, i) : leaves;
-        vec3 b = side ? corner_of(light, centre, (i + 1) & 3) : returns;
-        float ha = dot(a, n), hb = dot(b, n);
-        vec3 crossing = mix(a, b, clamp(ha / (abs(ha - hb) > 1e-9 ? ha - hb : 1e-9), 0.0, 1.0));
-        bool down = side && ha > 0.0 && hb <= 0.0, up = side && ha <= 0.0 && hb > 0.0;
+        vec3 a = side ? corner_of(light, centre, bend, i) : leaves;
+        vec3 b = side ? corner_of(light, centre, bend, (i + 1) & 3) : returns;
+        vec3 crossing = mix(a, b, clamp(a.z / (abs(a.z - b.z) > 1e-9 ? a.z - b.z : 1e-9), 0.0, 1.0));
+        bool down = side && a.z > 0.0 && b.z <= 0.0, up = side && a.z <= 0.0 && b.z > 0.0;
         leaves = down ? crossing : leaves;
         returns = up ? crossing : returns;
         cut = cut || down;
         vec3 p = normalize(up ? crossing : a), q = normalize(down ? crossing : b);
         vec3 across = cross(p, q);
         float s = length(across);
-        bool counts = i < edges && (side ? max(ha, hb) > 0.0 : cut);
-        sum += counts && s > 1e-7 ? dot(across, n) * (atan(s, dot(p, q)) / s) : 0.0;
+        bool counts = i < edges && (side ? max(a.z, b.z) > 0.0 : cut);
+        sum += counts && s > 1e-7 ? across.z * (atan(s, dot(p, q)) / s) : 0.0;
     } while (++i < edges);
     return abs(sum) * (0.5 / PI);
 }
 
-// Share of a lobe of tangent width `wide` around ray r that meets the rectangle (a Gaussian lobe, whose
-// integral over a rectangle is a product of error functions).
-float mirror_form(Light light, vec3 position, vec3 r, float wide) {
-    vec3 c = light.position - position;
-    float ahead = -dot(r, light.direction);
-    float t = dot(c, light.direction) / min(-ahead, -1e-3);
-    vec3 hit = r * t - c;
-    vec2 half_size = vec2(length(light.half_width), length(light.half_height));
-    vec2 at = vec2(dot(hit, light.half_width), dot(hit, light.half_height)) / (half_size * half_size);
-    vec2 sigma = vec2(max(wide * max(t, 0.0), 1e-4)) / half_size;
-    vec2 low = (-1.0 - at) / sigma, high = (1.0 - at) / sigma;
-    vec2 share = 0.5 * (tanh(clamp(1.5957691 * (high + 0.044715 * high * high * high) * 0.5, -15.0, 15.0))
-                      - tanh(clamp(1.5957691 * (low + 0.044715 * low * low * low) * 0.5, -15.0, 15.0)));
-    return ahead > 0.0 && t > 0.0 ? share.x * share.y : 0.0;
+// Leaves directions as they are, n being z.
+mat3 upright(vec3 n) {
+    vec3 aside = normalize(cross(n, abs(n.x) < 0.7 ? vec3(1, 0, 0) : vec3(0, 1, 0)));
+    return transpose(mat3(aside, cross(n, aside), n));
 }
 
 // GGX with height-correlated Smith masking (Heitz 2014) and Schlick's Fresnel: f * cos at the light.

@@ -29,5 +29,19 @@ vec3 mirrored(vec3 position, vec3 r, float alpha) {
 }
 
 // Share of the surroundings that a surface reflects specularly: scale and offset of f0 (fsid.render.reflectance).
+// In the upper half of the table the bent cosine that such a lobe is (tools/fit_lobes.py): a, b, c, d.
 layout(binding = 14) uniform sampler2D reflectance;
-vec2 mirror_share(float roughness, float nv) { return textureLod(reflectance, vec2(nv, roughness), 0.0).xy; }
+const float TABLE_EDGE = 0.5 / 32.0;
+vec4 reflectance_at(float roughness, float nv, float part) {
+    vec2 at = clamp(vec2(nv, roughness), TABLE_EDGE, 1.0 - TABLE_EDGE);
+    return textureLod(reflectance, vec2(at.x, 0.5 * (at.y + part)), 0.0);
+}
+vec2 mirror_share(float roughness, float nv) { return reflectance_at(roughness, nv, 0.0).xy; }
+
+// Bends directions so that GGX's lobe of a surface n seen from v becomes a cosine around z.
+mat3 lobe_of(float roughness, vec3 n, vec3 v) {
+    vec4 w = reflectance_at(roughness, max(abs(dot(n, v)), 1e-3), 1.0);
+    vec3 aside = v - n * dot(n, v);
+    aside = dot(aside, aside) > 1e-8 ? normalize(aside) : normalize(cross(n, abs(n.x) < 0.7 ? vec3(1, 0, 0) : vec3(0, 1, 0)));
+    return mat3(w.x, 0.0, w.w, 0.0, w.z, 0.0, w.y, 0.0, 1.0) * transpose(mat3(aside, cross(n, aside), n));
+}

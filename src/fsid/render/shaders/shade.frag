@@ -242,11 +242,13 @@ vec3 returned(Light light, Sample p, Reflector b) {
 #if AREAS
     bool area = light.kind == AREA;
     int edges = area && dot(to_light, light.direction) < 0.0 ? 5 : 0;
-    float front = form_factor(light, p.position, b.n, edges);
-    vec3 from_area = b.diffuse * front + b.mirror * mirror_form(light, p.position, b.r, b.alpha);
+    float front = form_factor(light, p.position, upright(b.n), edges);
+    float glossy = form_factor(light, p.position, lobe_of(sqrt(b.alpha), b.n, b.v), edges);
+    vec3 from_area = b.diffuse * front + b.mirror * glossy;
 #if LOBES
-    from_area = from_area * b.below + b.coat * mirror_form(light, p.position, b.r, b.coat_alpha)
-        + b.cloth * front + b.through * form_factor(light, p.position, -b.n, edges);
+    from_area = from_area * b.below + b.cloth * front
+        + b.coat * form_factor(light, p.position, lobe_of(sqrt(b.coat_alpha), b.n, b.v), edges)
+        + b.through * form_factor(light, p.position, upright(-b.n), edges);
 #endif
     result = area ? edges > 0 ? light.colour * from_area : vec3(0) : result;
 #endif
