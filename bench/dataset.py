@@ -1,8 +1,8 @@
-"""What a dataset costs beside rendering: python bench/dataset.py [--pairs 6] [--scenes 60] [--width 1920]
+"""What a dataset costs beside rendering: python bench/dataset.py --only PART
 
 All ratios are of one run. "cpu" is processor time of all threads of the process, which stays true on a busy
-machine. Sections: cost of a pair by stage; two workers against one; memory per scene; time over pixels and
-over triangles; patches of the loader. The memory of 1,000 scenes: --scenes 1000 --only memory.
+machine. Parts: stages (cost of a pair), workers (two against one), memory (per scene), growth (time over
+pixels and triangles), loader (patches per second). The memory of 1,000 scenes: --only memory --scenes 1000.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import os
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -28,34 +28,53 @@ SECTIONS = ("stages", "workers", "memory", "growth", "loader")
 
 
 class Timed:
-    """A renderer that adds up the time it takes; sampling of the scene is not in it."""
+    """A renderer that adds up the processor time it takes; sampling of the scene is not in it."""
 
     def __init__(self, renderer: Renderer) -> None:
-        self._renderer, self.wall_s, self.cpu_s = renderer, 0.0, 0.0
+        self._renderer, self.cpu_s = renderer, 0.0
+        self.scenes: list[Scene] = []
 
     def render(self, scene: Scene, camera_index: int = 0) -> Frame:
-        wall, cpu = time.perf_counter(), time.process_time()
+        start = time.process_time()
         frame = self._renderer.render(scene, camera_index)
-        self.wall_s += time.perf_counter() - wall
-        self.cpu_s += time.process_time() - cpu
+        self.cpu_s += time.process_time() - start
+        self.scenes.append(scene)
         return frame
 
 
-def stages(config: GenerateConfig, pairs: int) -> None:
-    """Share of everything that is not rendering, scene sampling among it, in the time of a pair."""
+@dataclass(frozen=True)
+class Pair:
+    """Mean processor seconds of a pair. fresh: rendering, with materials that no scene before it had; again:
+    the same scene rendered a second time; rest: all that is not rendering."""
+
+    fresh: float
+    again: float
+    rest: float
+    bytes: int
+
+    def __str__(self) -> str:
+        share, warm = (100 * self.rest / (self.rest + render) for render in (self.fresh, self.again))
+        return (
+            f"rendering {self.fresh:.2f} s, {self.again:.2f} s where its materials are there; "
+            f"else {self.rest:.2f} s: {share:.1f} %, {warm:.1f} %; {self.bytes / 1e6:.1f} MB"
+        )
+
+
+def stages(config: GenerateConfig, pairs: int) -> Pair:
+    """What a pair costs, after one that compiles the programs."""
     with Renderer(supersampling=config.supersampling, texture_size=config.texture_px) as renderer:
         make(config, 0, renderer)
-        timed, wall, cpu = Timed(renderer), time.perf_counter(), time.process_time()
+        timed, start = Timed(renderer), time.process_time()
         with tempfile.TemporaryDirectory() as folder:
-            samples = (encoded for i in range(1, pairs + 1) for encoded in make(config, i, timed))
-            write_shard(Path(folder) / "shard.tar", samples)
-        wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
-    print(
-        f"pair of {config.width}x{config.height}: {wall / pairs:.2f} s, of it rendering "
-        f"{timed.wall_s / pairs:.2f} s; "
-        f"not rendering {100 * (1 - timed.wall_s / wall):.1f} % of the time, "
-        f"{100 * (1 - timed.cpu_s / cpu):.1f} % of cpu"
-    )
+            shard = Path(folder) / "shard.tar"
+            write_shard(shard, (encoded for i in range(1, pairs + 1) for encoded in make(config, i, timed)))
+            size = shard.stat().st_size
+        total = time.process_time() - start
+        again = Timed(renderer)
+        for scene in timed.scenes:
+            renderer.render(scene)
+            again.render(scene)
+    return Pair(timed.cpu_s / pairs, again.cpu_s / pairs, (total - timed.cpu_s) / pairs, size // pairs)
 
 
 def make(
@@ -69,23 +88,31 @@ def make(
 
 
 def workers(config: GenerateConfig, pairs: int) -> None:
-    """Two workers against one, without starting them: what the second half of the shards took."""
-    rates = {}
-    for count in (1, 2, 1, 2):
-        with tempfile.TemporaryDirectory() as folder:
-            times: list[tuple[float, int]] = []
-            generate(
-                Path(folder) / "data",
-                config,
-                count=4 * pairs,
-                workers=count,
-                shard_size=1,
-                progress=lambda done, total, times=times: times.append((time.perf_counter(), done)),
-            )
-        (start, before), (end, after) = times[1 + pairs], times[-1 if times[-1][1] > times[-2][1] else -2]
-        rates[count] = max(rates.get(count, 0.0), (after - before) / (end - start))
-    ratio = rates[2] / rates[1]
-    print(f"workers: 1 makes {rates[1]:.2f} pairs/s, 2 make {rates[2]:.2f}: {ratio:.2f} times as many")
+    """Two workers of one thread against one, and against one of two threads; their start is left out."""
+    teams = {"1 of 1 thread": (1, "1"), "1 of 2 threads": (1, "2"), "2 of 1 thread": (2, "1")}
+    rates = dict.fromkeys(teams, 0.0)
+    for _ in range(2):
+        for name, (count, threads) in teams.items():
+            os.environ["LP_NUM_THREADS"] = os.environ["OMP_NUM_THREADS"] = threads
+            rates[name] = max(rates[name], pairs_per_second(config, pairs, count))
+    best = rates.pop("2 of 1 thread")
+    print(f"workers: 2 of 1 thread make {best:.2f} pairs/s")
+    for name, rate in rates.items():
+        print(f"  {name} makes {rate:.2f}: 2 make {best / rate:.2f} times as many")
+
+
+def pairs_per_second(config: GenerateConfig, pairs: int, count: int) -> float:
+    """Of the second half of 4 x `pairs` shards of one pair."""
+    times: list[tuple[float, int]] = []
+
+    def progress(done: int, total: int) -> None:
+        times.append((time.perf_counter(), done))
+
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "data"
+        generate(out, config, count=4 * pairs, workers=count, shard_size=1, progress=progress)
+    (start, before), (end, after) = times[2 * pairs], times[4 * pairs]
+    return (after - before) / (end - start)
 
 
 def memory(config: GenerateConfig, scenes: int) -> None:
@@ -193,17 +220,18 @@ def write_noise(folder: Path) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--pairs", type=int, default=4, help="pairs per measurement")
-    parser.add_argument("--scenes", type=int, default=60, help="scenes of the memory measurement")
+    parser.add_argument("--pairs", type=int, default=3, help="pairs per measurement")
+    parser.add_argument("--scenes", type=int, default=300, help="scenes of the memory measurement")
     parser.add_argument("--width", type=int, default=1920, help="of a frame, pixels; 16:9")
-    parser.add_argument("--only", choices=SECTIONS, help="one section")
+    parser.add_argument("--only", choices=SECTIONS, help="one part")
     options = parser.parse_args()
     config = GenerateConfig(width=options.width, height=options.width * 9 // 32 * 2)
     small = GenerateConfig(width=320, height=180, scene=SceneConfig(objects=(10, 20)))
-    sections: dict[str, Callable[[], None]] = {
-        "stages": lambda: stages(config, options.pairs),
-        "workers": lambda: workers(small, options.pairs),
-        "memory": lambda: memory(small, options.scenes),
+    tiny = GenerateConfig(width=128, height=72, scene=SceneConfig(objects=(3, 5)))
+    sections: dict[str, Callable[[], object]] = {
+        "stages": lambda: print(f"pair of {config.width}x{config.height}: {stages(config, options.pairs)}"),
+        "workers": lambda: workers(small, 2 * options.pairs),
+        "memory": lambda: memory(tiny, options.scenes),
         "growth": lambda: growth(config),
         "loader": loader,
     }
