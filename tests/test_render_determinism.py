@@ -14,7 +14,7 @@ import pytest
 from fsid.assets import MATERIAL_VARIANTS, material_families
 from fsid.errors import FsidError
 from fsid.render import Frame, Renderer
-from fsid.render.layers import LayerStore
+from fsid.render.layers import LayerStore, fitting_size
 from fsid.render.texels import bake_texels, level_ranges
 from fsid.render.texture_array import TextureArray, gl
 from fsid.scene import LightConfig, Scene, SceneConfig, sample
@@ -172,3 +172,24 @@ def test_the_driver_is_named(renderer: Renderer) -> None:
     assert info.renderer
     assert info.vendor
     assert info.version[0] == "4"
+
+
+@pytest.mark.parametrize(("materials", "size"), [(1, 1024), (30, 1024), (31, 512), (120, 512), (121, 256)])
+def test_many_materials_have_smaller_tiles(materials: int, size: int) -> None:
+    """320 MiB hold 30 layers of 1024 texels, 120 of 512."""
+    assert fitting_size(1024, materials) == size
+
+
+def test_the_size_of_tiles_follows_the_scene_alone(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A scene looks the same after one whose tiles were of another size."""
+    import fsid.render.renderer as module
+
+    before = renderer.render(scene(1))
+    with monkeypatch.context() as patch:
+        patch.setattr(module, "fitting_size", lambda size, count: 2 * size)
+        larger = renderer.render(scene(1))
+    after = renderer.render(scene(1))
+    assert (larger.radiance != before.radiance).any()
+    np.testing.assert_array_equal(after.radiance, before.radiance)

@@ -1,11 +1,11 @@
-"""Fit the table of GGX lobes that shines area lights: python tools/fit_lobes.py (writes src/fsid/render/lobes.npy)
+"""Fit the GGX lobes for area lights: python tools/fit_lobes.py (writes src/fsid/render/lobes.npy)
 
     D(w) = cos(W w) |det W| / (pi |W w|^3),   W = [[a, 0, b], [0, c, 0], [d, 0, 1]] up to scale
 
 is a clamped cosine that W has bent ("linearly transformed cosines", Heitz et al. 2016): its integral over a
-polygon is the form factor of the polygon under W. Here W is the one of largest likelihood given directions that
-GGX with height-correlated Smith masking reflects, without Fresnel, one cell after the other; Heitz et al.
-minimise an L3 norm instead. Frame: x along the viewer's projection, z the normal.
+polygon is the form factor of the polygon under W. Here W is the one of largest likelihood given directions
+that GGX with height-correlated Smith masking reflects, without Fresnel, one cell after the other; Heitz et
+al. minimise an L3 norm instead. Frame: x along the viewer's projection, z the normal.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ def main() -> None:
     table = np.zeros((SIZE, SIZE, 4), np.float32)
     centres = (np.arange(SIZE) + 0.5) / SIZE
     for row in range(SIZE):
-        start = np.log((0.6 * max(centres[row], 0.05) ** 2 + 0.02,) * 2).tolist() + [0.0]
+        width = float(np.log(0.6 * max(centres[row], 0.05) ** 2 + 0.02))
+        start = [width, width, 0.0]
         for column in reversed(range(SIZE)):
             table[row, column], start = fit(centres[row], centres[column], start)
         print(f"roughness {centres[row]:.2f}: {table[row, SIZE // 2]}", flush=True)

@@ -12,8 +12,10 @@ import numpy as np
 from fsid.render.texels import Bake, Texels
 from fsid.render.texture_array import TextureArray
 
-BUDGET_BYTES = 640 * 2**20
-"""Texture memory: 60 layers of 1024 texels, four times as many of 512; a scene that needs more gets more."""
+BUDGET_BYTES = 320 * 2**20
+"""Texture memory: 30 layers of 1024 texels, four times as many of 512."""
+
+_SMALLEST = 64
 
 _STEP_LAYERS = 16
 
@@ -28,13 +30,26 @@ class Layer:
     roughness: float
 
 
+def fitting_size(size: int, materials: int, budget_bytes: int = BUDGET_BYTES) -> int:
+    """Texels per side at which all materials of a scene fit the budget, at most `size`: a scene of many
+    materials has smaller ones, whatever was rendered before it."""
+    while size > _SMALLEST and materials * _layer_bytes(size) > budget_bytes:
+        size //= 2
+    return size
+
+
+def _layer_bytes(size: int) -> int:
+    """Both arrays, all levels."""
+    return size * size * 8 * 4 // 3
+
+
 class LayerStore:
     """The resident layers. What a layer holds depends on its material alone, never on its slot."""
 
     def __init__(self, context: moderngl.Context, size: int, budget_bytes: int = BUDGET_BYTES) -> None:
         self._context = context
         self._size = size
-        self._budget_layers = max(1, budget_bytes * 3 // (size * size * 8 * 4))
+        self._budget_layers = max(1, budget_bytes // _layer_bytes(size))
         self._resident: OrderedDict[Hashable, Layer] = OrderedDict()
         self._arrays: list[TextureArray] = []
         self._capacity = 0
@@ -51,6 +66,18 @@ class LayerStore:
         for key in missing:
             self._resident[key] = self._write(bake(*key, self._size))
         return {key: self._resident[key] for key in wanted}
+
+    @property
+    def size(self) -> int:
+        """Texels per side of a layer."""
+        return self._size
+
+    def release(self) -> None:
+        """Free all layers; the store cannot be used afterwards."""
+        for array in self._arrays:
+            array.release()
+        self._arrays, self._capacity = [], 0
+        self._resident.clear()
 
     def use(self, masks_unit: int, relief_unit: int) -> None:
         """Bind the two arrays to texture units."""

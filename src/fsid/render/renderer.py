@@ -22,7 +22,7 @@ import numpy as np
 from fsid.errors import FsidError
 from fsid.render.buffers import Buffers
 from fsid.render.camera import NEAR_M, lens_of
-from fsid.render.context import GlInfo, gl_info, open_context
+from fsid.render.context import GlInfo, gl_info, open_context, return_large_blocks
 from fsid.render.drawable import BACKGROUND_ID, Drawable, View, view_of
 from fsid.render.exposure import Shot, shots_of
 from fsid.render.flow import flow_between
@@ -30,7 +30,7 @@ from fsid.render.frame import Frame
 from fsid.render.frustum import in_view, rectangles, sees
 from fsid.render.geometry import Geometry, draw_commands, merge
 from fsid.render.lamps import lamps_of
-from fsid.render.layers import Layer, LayerStore
+from fsid.render.layers import Layer, LayerStore, fitting_size
 from fsid.render.mirror import mirror_shot
 from fsid.render.programs import load_program
 from fsid.render.quality import QUALITIES, tap_table
@@ -68,7 +68,8 @@ class Renderer:
     """Owns the process's one OpenGL context and what is resident on it. Use it in a `with` block.
 
     device_index: EGL device; None takes the first GPU, or else the CPU. supersampling: edge of the square
-    grid of samples per pixel, 1..4. texture_size: texels per side of a material tile, a power of two.
+    grid of samples per pixel, 1..4. texture_size: texels per side of a material tile, a power of two; fewer
+    where a scene has more materials than texture memory is meant for (`fsid.render.layers.BUDGET_BYTES`).
     quality: "high", or "fast" with fewer taps and coarser shadow maps (docs/render.md has both measured).
     Raises FsidError where OpenGL 4.3 is missing or a second Renderer is opened in one process.
     """
@@ -95,6 +96,7 @@ class Renderer:
             raise FsidError(f"quality '{quality}': use {' or '.join(QUALITIES)}")
         self._quality = QUALITIES[quality]
         self._grid = supersampling
+        return_large_blocks()
         self._context = open_context(device_index)
         Renderer._active = self
         try:
@@ -105,6 +107,7 @@ class Renderer:
 
     def _prepare(self, texture_size: int) -> None:
         context = self._context
+        self._texture_size = texture_size
         self._layers = LayerStore(context, texture_size)
         self._depth = load_program(context, "depth.vert", None)
         self._moments = load_program(context, "screen.vert", "moments.frag")
@@ -212,7 +215,7 @@ class Renderer:
 
     def _draw(self, view: View, shot: Shot, bake: Bake, mark: Mark) -> None:
         """One pass over a view; the result stays in the targets."""
-        layers = self._layers.load([(m.family, m.variant) for d in view.drawables for m in d.materials], bake)
+        layers = self._load_layers(view, bake)
 
         def albedo_of(material: Material) -> np.ndarray:
             return _mean_albedo(material, layers[material.family, material.variant])
@@ -261,6 +264,14 @@ class Renderer:
             mark("shading")
         finally:
             buffers.release()
+
+    def _load_layers(self, view: View, bake: Bake) -> dict[tuple[str, int], Layer]:
+        wanted = {(m.family, m.variant): None for d in view.drawables for m in d.materials}
+        size = fitting_size(self._texture_size, len(wanted))
+        if size != self._layers.size:
+            self._layers.release()
+            self._layers = LayerStore(self._context, size)
+        return self._layers.load(wanted, bake)
 
     def _draw_mirror(self, stage: _Stage, below: Shot) -> None:
         """The image that smooth ground shows, with what lies below the ground cut off."""
