@@ -28,7 +28,7 @@ from fsid.render.drawable import View, view_of
 from fsid.scene import Scene, SceneConfig, sample
 
 SIZES = ((960, 540), (1920, 1080))
-STAGES = ("scene build", "upload", "shadows", "samples", "occlusion", "shading", "readback")
+STAGES = ("scene build", "upload", "shadows", "mirror", "samples", "occlusion", "shading", "readback")
 
 
 def main() -> None:
