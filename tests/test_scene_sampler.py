@@ -150,8 +150,12 @@ def test_v4_floats_as_often_as_configured():
 
 
 def floating(share):
+    """Without tables: what misses one lies on the floor below."""
+    background = BackgroundConfig(kind_shares=(0.6, 0.1, 0.0, 0.3))
     placement = PlacementConfig(floating_share=share, far_share=0.0)
-    return dataclasses.replace(CONFIG, mesh_families=("toy_blocks", "mug"), placement=placement)
+    return dataclasses.replace(
+        CONFIG, mesh_families=("toy_blocks", "mug"), placement=placement, background=background
+    )
 
 
 def test_things_lie_in_a_bowl_and_not_on_its_rim(monkeypatch):
@@ -186,6 +190,25 @@ def test_sizes_follow_the_power_law():
         assert (sizes < middle).mean() == pytest.approx(share, abs=0.03)
         assert sizes.min() >= 0.1
         assert sizes.max() <= 1.6
+
+
+def test_copies_look_alike_and_lie_near_the_first_of_their_kind():
+    """As many as configured, in heaps of several sizes; without them every object is another one."""
+    crowd = dataclasses.replace(CONFIG, objects=(60, 60), placement=PlacementConfig(far_share=0.0))
+    assert len(set(scene(0, config=dataclasses.replace(crowd, repeat_share=0.0)).objects)) == 60
+    kinds, heaps, ratios = 0, set(), []
+    for seed in SEEDS:
+        s = scene(seed, config=dataclasses.replace(crowd, repeat_share=0.5))
+        groups = {o: [i for i, other in enumerate(s.objects) if other == o] for o in s.objects}
+        kinds += len(groups)
+        heaps |= {len(group) for group in groups.values()}
+        assert all(s.materials[i] == s.materials[group[0]] for group in groups.values() for i in group)
+        places = np.array([t.position_m for t in s.transforms])
+        near = [np.linalg.norm(places[g[1:]] - places[g[0]], axis=1).mean() for g in groups.values() if g[1:]]
+        ratios.append(np.mean(near) / np.linalg.norm(places - places.mean(0), axis=1).mean())
+    assert kinds / len(SEEDS) == pytest.approx(30.5, abs=5)
+    assert len(heaps) > 4
+    assert np.mean(ratios) < 0.8
 
 
 def test_a_new_family_changes_only_the_draws_that_it_wins(monkeypatch):

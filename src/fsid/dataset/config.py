@@ -32,7 +32,7 @@ class Checks:
     """
 
     black_share: float = 0.5
-    blown_share: float = 0.25
+    blown_share: float = 0.5
     duplicate_bits: int = 8
 
     def __post_init__(self) -> None:

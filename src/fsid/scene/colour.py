@@ -19,14 +19,14 @@ PALETTES = ("natural", "harmonised", "lab", "grey")
 _XYZ_TO_RGB = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
 _WHITE = np.array([0.9505, 1.0, 1.089])
 _DESATURATED = np.array([(1.0, keep, keep) for keep in (1.0, 0.8, 0.6, 0.4, 0.2, 0.0)])
-_NATURAL_HUES_DEG = (62.0, 80.0, 110.0, 262.0, 35.0)
-_NATURAL_SHARES = (0.34, 0.22, 0.18, 0.16, 0.10)
+_NATURAL_HUES_DEG = (62.0, 80.0, 108.0, 138.0, 262.0, 35.0, 15.0, 320.0)
+_NATURAL_SHARES = (0.20, 0.16, 0.13, 0.18, 0.14, 0.10, 0.05, 0.04)
 
 
 class Mood(NamedTuple):
     """What the colours of one scene share, as those of one photograph do.
 
-    hue_deg: CIELAB hue that the harmonised palette keeps to. hues_deg: two or three of the natural hues.
+    hue_deg: CIELAB hue that the harmonised palette keeps to. hues_deg: three to five of the natural hues.
     chroma: factor on all chromas but lab's.
     """
 
@@ -37,9 +37,9 @@ class Mood(NamedTuple):
 
 def mood_rand(rng: np.random.Generator) -> Mood:
     """A hue, and how colourful the scene is: most are muted, some vivid."""
-    hue_deg, count = float(rng.uniform(0, 360)), int(rng.integers(2, 4))
-    hues_deg = rng.choice(_NATURAL_HUES_DEG, 3, replace=False, p=_NATURAL_SHARES) + rng.normal(0, 10, 3)
-    return Mood(hue_deg, tuple(hues_deg[:count].tolist()), float(np.exp(rng.normal(-0.8, 0.5))))
+    hue_deg, count = float(rng.uniform(0, 360)), int(rng.integers(3, 6))
+    hues_deg = rng.choice(_NATURAL_HUES_DEG, 5, replace=False, p=_NATURAL_SHARES) + rng.normal(0, 10, 5)
+    return Mood(hue_deg, tuple(hues_deg[:count].tolist()), float(np.exp(rng.normal(0.3, 0.6))))
 
 
 def lab_to_rgb(lab: np.ndarray) -> np.ndarray:
@@ -82,7 +82,7 @@ def lab_rand(rng: np.random.Generator, palette: str, mood: Mood) -> np.ndarray:
             lab = np.array([rng.uniform(10, 95), *rng.uniform(-75, 75, 2)])
             if np.all((rgb := lab_to_rgb(lab)) > 0) and np.all(rgb < 1):
                 return lab
-    level = rng.triangular(14, 60, 94)
+    level = rng.uniform(8, 96)
     if palette == "grey":
         hue, chroma = rng.uniform(0, 360), rng.uniform(0, 5)
     elif palette == "harmonised":

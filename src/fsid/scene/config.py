@@ -20,9 +20,9 @@ from fsid.scene.knobs import Range, check_knobs, knob, shares
 class PlacementConfig:
     """T: position, scale, rotation (variant full)."""
 
-    size_m: Range = knob((0.12, 1.6), 0.01, 10.0)
+    size_m: Range = knob((0.06, 1.6), 0.01, 10.0)
     """Largest side of an object after scaling."""
-    size_exponent: float = knob(1.7, 0.0, 6.0)
+    size_exponent: float = knob(1.8, 0.0, 6.0)
     """p of the density of sizes, r^-p: 1 is log-uniform, 3 that of dead leaves (scale invariance in 2-D)."""
     spread_m: float = knob(1.1, 0.3, 20.0)
     """Objects lie within this distance of the focus: with the count N, their density."""
@@ -47,19 +47,19 @@ class MaterialConfig:
 
     plain_share: float = knob(0.17, 0.0, 1.0)
     """Share of surfaces in plain paint: homogeneous areas exist in reality too."""
-    tile_scale: Range = knob((0.25, 1.2), 0.01, 100.0)
+    tile_scale: Range = knob((0.12, 1.2), 0.01, 100.0)
     """Texture tile width on objects relative to the natural width of its family; log-uniform."""
     roughness_scale: Range = knob((0.5, 1.4), 0.0, 10.0)
     """Factor on the roughness maps."""
-    relief_scale: Range = knob((0.3, 1.5), 0.0, 20.0)
+    relief_scale: Range = knob((0.3, 2.0), 0.0, 20.0)
     """Factor on the relief of the height maps."""
     albedo: Range = knob((0.02, 0.9), 0.0, 1.0)
     """Limits of the linear albedo of surface colours, per channel."""
-    palette_shares: tuple[float, float, float, float] = shares(0.5, 0.2, 0.03, 0.27)
+    palette_shares: tuple[float, float, float, float] = shares(0.55, 0.15, 0.1, 0.2)
     """Shares of the palette models natural, harmonised, lab, grey."""
-    contrast: Range = knob((0.1, 0.9), 0.0, 1.0)
+    contrast: Range = knob((0.1, 1.0), 0.0, 1.0)
     """How far the colours of one material may lie apart: 1 as drawn, 0 all alike."""
-    natural_share: float = knob(0.5, 0.0, 1.0)
+    natural_share: float = knob(0.4, 0.0, 1.0)
     """Share of materials in the colours that their family has in nature, where it has some."""
     layer_share: float = knob(0.03, 0.0, 1.0)
     """Share of materials under dust, dirt, scratches or another layer of wear."""
@@ -92,7 +92,7 @@ class BackgroundConfig:
     """Share of surfaces whose material comes from the pool of their sort (`fsid.scene.pools`)."""
     plain_share: float = knob(0.3, 0.0, 1.0)
     """Share of walls, ceilings and backdrops in plain paint."""
-    tile_scale: Range = knob((0.5, 1.6), 0.01, 100.0)
+    tile_scale: Range = knob((0.25, 1.6), 0.01, 100.0)
     """Texture tile width on backgrounds relative to the natural width of its family; log-uniform."""
     aligned_share: float = knob(0.95, 0.0, 1.0)
     """Share of surfaces whose texture lies along their edges, as planks and bricks do."""
@@ -123,7 +123,7 @@ class LightConfig:
     """Edges of an area light; log-uniform."""
     distance_m: Range = knob((0.9, 2.4), 0.1, 100.0)
     """Distance of a lamp from the focus."""
-    ambient_share: Range = knob((0.5, 3.0), 1e-4, 10.0)
+    ambient_share: Range = knob((0.4, 2.5), 1e-4, 10.0)
     """Irradiance from the surroundings relative to that from the lights; log-uniform."""
     sun_share: float = knob(0.6, 0.0, 1.0)
     """Share of open-air scenes with sunlight; the others have an overcast sky or, by `night_share`, lamps."""
@@ -140,8 +140,10 @@ class LightConfig:
 class SceneConfig:
     """Settings of `fsid.scene.sample`. Raises FsidError that names the key of a value out of its limits."""
 
-    objects: tuple[int, int] = knob((25, 45), 1, 1000)
+    objects: tuple[int, int] = knob((40, 130), 1, 1000)
     """N, number of objects, both ends included."""
+    repeat_share: float = knob(0.5, 0.0, 1.0)
+    """Share of objects that are copies of another one, in the same materials, near it: heaps, rows, sets."""
     backgrounds: int = knob(0, 0, 10**6)
     """K, number of different backgrounds in all scenes; 0 gives every scene its own."""
     mesh_families: tuple[str, ...] = ()

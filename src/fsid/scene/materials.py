@@ -89,7 +89,9 @@ def _colours_rand(rng: np.random.Generator, config: SceneConfig, mood: Mood) -> 
     contrast = float(rng.uniform(*knobs.contrast))
     base = lab_rand(rng, palette, mood)
     related = base + contrast * (related_rand(rng, base) - base)
-    other = base + contrast * (_contrasting_rand(rng, base, palette, mood) - base)
+    chroma = 0.7 * rng.random() ** 3  # texture is light and dark far more than colour (docs/results.md)
+    apart = (_contrasting_rand(rng, base, palette, mood) - base) * (1.0, chroma, chroma)
+    other = base + contrast * apart
     a, b, c = albedo_rgb(np.stack([base, related, other]), *knobs.albedo)
     return vec3(a), vec3(b), vec3(c)
 

@@ -81,8 +81,11 @@ def scattered(
     out: list[Transform] = []
     spheres: list[tuple[np.ndarray, float]] = []
     relief = Relief(space)
+    first: dict[Object, tuple[np.ndarray, float]] = {}
     for rng, S in zip(rngs, objects, strict=True):
         draw = _draw_rand(rng, space, focus_m, config)
+        if S in first:
+            draw = _beside(draw, *first[S], focus_m, space, config)
         points = surface_points(S.family, S.seed)
         shape = draw.stretch * draw.size_m / (np.ptp(points, axis=1) * draw.stretch).max()
         crowding = _crowding(draw.spots, draw.size_m, spheres, keep_clear_m[0], focus_m)
@@ -93,6 +96,7 @@ def scattered(
         if not draw.floating:
             relief.add(world)
         spheres.append((world.mean(1), float(np.ptp(world, axis=1).max())))
+        first.setdefault(S, spheres[-1])
         out.append(Transform(vec3(offset), vec3(draw.turn_deg), vec3(shape * shrink)))
     return out
 
@@ -111,6 +115,20 @@ def _draw_rand(rng: np.random.Generator, space: Space, focus_m: np.ndarray, conf
         size_m *= distance / config.spread_m
     spots = np.c_[focus_m[0] + rho * np.cos(phi), focus_m[1] + rho * np.sin(phi), z]
     return _Draw(turn_deg, size_m, stretch, bool(floating), np.clip(spots, space.low, space.high))
+
+
+def _beside(
+    draw: _Draw,
+    place_m: np.ndarray,
+    size_m: float,
+    focus_m: np.ndarray,
+    space: Space,
+    config: PlacementConfig,
+) -> _Draw:
+    """The draw of a copy: nearly as large as the first of its kind at `place_m`, about three sizes away."""
+    away = (draw.spots - focus_m) * min(3 * size_m / config.spread_m, 1.0)
+    spots = np.clip(place_m + away, space.low, space.high)
+    return draw._replace(size_m=size_m * float(draw.stretch[0]), spots=spots)
 
 
 def _crowding(

@@ -101,24 +101,28 @@ def _streams(seed: int) -> Streams:
 
 
 def _objects_rand(stream: np.random.SeedSequence, config: SceneConfig) -> tuple[Object, ...]:
+    """Objects; some are another one's copies, and copies are copied too, so that heaps of all sizes arise."""
     rng = np.random.default_rng(stream)
     low, high = config.objects
-    count = int(rng.integers(low, high + 1))
-    return tuple(Object(mesh_rand(rng, config), int(rng.integers(2**31))) for _ in range(count))
+    out: list[Object] = []
+    for _ in range(int(rng.integers(low, high + 1))):
+        own = Object(mesh_rand(rng, config), int(rng.integers(2**31)))
+        repeated, which = rng.random() < config.repeat_share, int(rng.random() * len(out))
+        out.append(out[which] if repeated and out else own)
+    return tuple(out)
 
 
 def _materials_rand(
     stream: np.random.SeedSequence, objects: Sequence[Object], config: SceneConfig, mood: Mood, *, plain: bool
 ) -> tuple[tuple[Material, ...], ...]:
-    """One material per part; one stream per object, so that its number of parts disturbs no other."""
-    parts = [build_mesh(S.family, S.seed).part_names for S in objects]
-    if plain:
-        return tuple((PLAIN,) * len(names) for names in parts)
-    rngs = [np.random.default_rng(s) for s in stream.spawn(len(objects))]
-    return tuple(
-        tuple(material_rand(rng, config, mood, name) for name in names)
-        for rng, names in zip(rngs, parts, strict=True)
-    )
+    """One material per part, alike for copies; one stream per object, so that its number of parts disturbs no
+    other."""
+    out: dict[Object, tuple[Material, ...]] = {}
+    for S, child in zip(objects, stream.spawn(len(objects)), strict=True):
+        if S not in out:
+            names, rng = build_mesh(S.family, S.seed).part_names, np.random.default_rng(child)
+            out[S] = tuple(PLAIN if plain else material_rand(rng, config, mood, name) for name in names)
+    return tuple(out[S] for S in objects)
 
 
 def _scattered_rand(

@@ -3,10 +3,9 @@
     gain = min(key / median(Y), 1 / percentile(Y, 100 - clipped)),      Y = luminance of the frame
 
 A camera meters the scene to a mid-grey and backs off for highlights, and neither exactly. So `key` is
-log-uniform over 0.1 to 0.4 (an 18 % card, a little more than a stop over to a little less than one under) and
-the share of pixels that may reach saturation is log-uniform over 0.2 % to 8 %: every frame keeps some
-clipped highlights, few are burnt out. With these, lightness and clipping of rendered frames lie as those of
-photographs do on the sensor (docs/results.md); half a stop less, and the frames were too dark.
+log-uniform over 0.1 to 0.5 (an 18 % card, from 1.5 stops over to one under) and the share of pixels that
+may reach saturation is log-uniform over 0.2 % to 40 %: a white sky or snow burns out in one photograph in
+twenty, and a denoiser that never saw it loses most there (docs/results.md).
 Low light needs no darker image: the camera answers it with ISO, and ISO sets the noise.
 """
 
@@ -17,8 +16,8 @@ import numpy as np
 from fsid.errors import FsidError
 from fsid.sensor.colour import SRGB_TO_XYZ
 
-KEY_RANGE = (0.1, 0.4)
-CLIPPED_PERCENT_RANGE = (0.2, 8.0)
+KEY_RANGE = (0.1, 0.5)
+CLIPPED_PERCENT_RANGE = (0.2, 40.0)
 
 
 def exposure_rand(rng: np.random.Generator, radiance: np.ndarray) -> float:
