@@ -56,7 +56,8 @@ class GenerateConfig:
     validation_every: every so-manieth scene (or photograph) is for validation, all its pairs; 0: none.
     renderer: raster (OpenGL), or reference (path tracer: slow, and its noise is in the clean image).
     quality: of the rasteriser, high or fast. supersampling: edge of the grid of samples per pixel.
-    texture_size: pixels per edge of a baked material, a power of two; 0 follows the width (see `texture_px`).
+    texture_size: pixels per edge of a baked material at most, a power of two; 0 follows the width (see
+    `texture_px`). A scene of many materials has smaller ones (`fsid.render.layers`).
     images: a folder of photographs or linear .exr renders to use instead of scenes ("" renders scenes).
     """
 

@@ -39,7 +39,7 @@ def mood_rand(rng: np.random.Generator) -> Mood:
     """A hue, and how colourful the scene is: most are muted, some vivid."""
     hue_deg, count = float(rng.uniform(0, 360)), int(rng.integers(3, 6))
     hues_deg = rng.choice(_NATURAL_HUES_DEG, 5, replace=False, p=_NATURAL_SHARES) + rng.normal(0, 10, 5)
-    return Mood(hue_deg, tuple(hues_deg[:count].tolist()), float(np.exp(rng.normal(0.3, 0.6))))
+    return Mood(hue_deg, tuple(hues_deg[:count].tolist()), float(np.exp(rng.normal(0.0, 0.6))))
 
 
 def lab_to_rgb(lab: np.ndarray) -> np.ndarray:

@@ -55,7 +55,7 @@ class MaterialConfig:
     """Factor on the relief of the height maps."""
     albedo: Range = knob((0.02, 0.9), 0.0, 1.0)
     """Limits of the linear albedo of surface colours, per channel."""
-    palette_shares: tuple[float, float, float, float] = shares(0.55, 0.15, 0.1, 0.2)
+    palette_shares: tuple[float, float, float, float] = shares(0.57, 0.15, 0.06, 0.22)
     """Shares of the palette models natural, harmonised, lab, grey."""
     contrast: Range = knob((0.1, 1.0), 0.0, 1.0)
     """How far the colours of one material may lie apart: 1 as drawn, 0 all alike."""
