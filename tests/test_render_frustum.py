@@ -48,27 +48,28 @@ def same(a: Frame, b: Frame) -> bool:
 def test_tiles_that_nobody_sees_and_places_without_glass_are_left_out(
     renderer: Renderer, seed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    import fsid.render.renderer as module
+    import fsid.render.shade_pass as shade_pass
+    import fsid.render.shadow_pass as shadow_pass
 
     what = scene(seed)
     answers: list[bool] = []
-    sees, rectangles = module.sees, module.rectangles
+    sees, rectangles = shadow_pass.sees, shade_pass.rectangles
 
     def counting(*arguments):
         answers.append(sees(*arguments))
         return answers[-1]
 
-    monkeypatch.setattr(module, "sees", counting)
+    monkeypatch.setattr(shadow_pass, "sees", counting)
     less = renderer.render(what)
     assert {False, True} == set(answers)
-    monkeypatch.setattr(module, "sees", lambda *rest: True)
-    monkeypatch.setattr(module, "rectangles", lambda *rest: [(0, 0, *rest[-1])])
+    monkeypatch.setattr(shadow_pass, "sees", lambda *rest: True)
+    monkeypatch.setattr(shade_pass, "rectangles", lambda *rest: [(0, 0, *rest[-1])])
     assert same(less, renderer.render(what))
-    assert rectangles is not module.rectangles
+    assert rectangles is not shade_pass.rectangles
 
 
 def test_a_bent_lens_sees_its_tiles_too(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
-    import fsid.render.renderer as module
+    import fsid.render.shadow_pass as module
 
     what = scene(4)
     lens = Distortion("brown-conrady", (-0.12, 0.02, 0.001, -0.001, 0.0))

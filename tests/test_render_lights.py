@@ -159,7 +159,7 @@ def test_a_grey_sky_is_a_furnace(renderer: Renderer) -> None:
     radiance = np.full((32, 64, 3), 0.7, np.float32)
     what = replace(view(lambertian(sphere(0.3), (0.8, 0.4, 0.1))), sky=Sky("procedural", (0.7, 0.7, 0.7)))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("fsid.render.renderer.panorama", lambda sky: radiance)
+        patch.setattr("fsid.render.stage.panorama", lambda sky: radiance)
         frame = draw(renderer, what)
     np.testing.assert_allclose(frame.radiance[44:52, 44:52].mean((0, 1)), (0.56, 0.28, 0.07), rtol=5e-3)
     np.testing.assert_allclose(frame.radiance[:4, :4], 0.7, rtol=1e-3)

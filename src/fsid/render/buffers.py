@@ -1,4 +1,4 @@
-"""What one view keeps on the device while it is drawn: vertices, tables, surroundings."""
+"""What one stage keeps on the device while it is drawn: vertices, tables, surroundings."""
 
 from __future__ import annotations
 
@@ -7,26 +7,19 @@ from typing import Any
 import moderngl
 import numpy as np
 
-from fsid.render.geometry import Geometry, surface_texels
-from fsid.render.room import Room
-from fsid.render.shadows import ShadowPlan
+from fsid.render.geometry import surface_texels
+from fsid.render.stage import Stage
 
 UNITS = {"room": 4, "surfaces": 5, "lights": 6, "sky": 10}
 """Texture units of the tables, as the shaders' `binding`s."""
 
 
 class Buffers:
-    """Made for one view and released after it."""
+    """Made for one stage and released after it."""
 
-    def __init__(
-        self,
-        context: moderngl.Context,
-        geometry: Geometry,
-        plan: ShadowPlan,
-        room: Room,
-        panorama: np.ndarray | None,
-    ) -> None:
+    def __init__(self, context: moderngl.Context, stage: Stage) -> None:
         self._context = context
+        geometry, plan = stage.geometry, stage.plan
         self._world = context.buffer(geometry.world.tobytes())
         self._vertices = context.buffer(geometry.vertices.tobytes())
         self._indices = context.buffer(geometry.indices.tobytes())
@@ -34,10 +27,10 @@ class Buffers:
         self._tables: dict[str, Any] = {
             "surfaces": self._table(surface_texels(geometry.surfaces)),
             "lights": self._table(plan.table.view(np.float32).reshape(len(plan.table), -1, 4)),
-            "room": self._room(room.radiance),
+            "room": self._room(stage.room.radiance),
         }
-        if panorama is not None:
-            self._tables["sky"] = self._panorama(panorama)
+        if stage.sky is not None:
+            self._tables["sky"] = self._panorama(stage.sky)
         self._owned += self._tables.values()
 
     def use(self) -> None:

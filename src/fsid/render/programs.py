@@ -1,13 +1,15 @@
-"""Shaders: text in `shaders/`, GLSL 4.30 core, `#include "name.glsl"` resolved by moderngl."""
+"""Programs: text in `shaders/`, GLSL 4.30 core, `#include "name.glsl"` resolved by moderngl."""
 
 from __future__ import annotations
 
 from importlib.resources import files
+from typing import Any
 
 import moderngl
+import numpy as np
 
 _SHADERS = files("fsid.render") / "shaders"
-_INCLUDES = ("encoding.glsl", "surfaces.glsl", "material.glsl", "lights.glsl", "room.glsl", "lens.glsl")
+_INCLUDES = tuple(sorted(file.name for file in _SHADERS.iterdir() if file.name.endswith(".glsl")))
 
 
 def load_program(
@@ -21,6 +23,19 @@ def load_program(
         version, rest = source.split("\n", 1)
         source = f"{version}\n{lines}{rest}"
     return context.program(vertex_shader=_source(vertex), fragment_shader=source)
+
+
+def set_uniforms(program: moderngl.Program, **values: Any) -> None:
+    """Set uniforms; one that the compiler removed is skipped."""
+    for name, value in values.items():
+        uniform = program.get(name, None)
+        if isinstance(uniform, moderngl.Uniform):
+            if isinstance(value, np.ndarray):
+                uniform.write(value.astype("f4").tobytes())
+            elif isinstance(value, tuple) and uniform.array_length > 1:
+                uniform.value = value[: uniform.array_length]
+            else:
+                uniform.value = value
 
 
 def _register(context: moderngl.Context) -> None:

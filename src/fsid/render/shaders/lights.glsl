@@ -1,25 +1,12 @@
-// Lights and their shadows. See fsid.render.shadows for the tables and fsid.scene.model.Light for the units.
+// Lights: see fsid.render.shadows for the table and fsid.scene.model.Light for the units.
 // Loops test at their end: llvmpipe has no other jump than back, so that every other loop runs once more than
 // needed, and both sides of every branch run.
 layout(binding = 6) uniform sampler2D light_table;
 uniform int light_count;
-layout(binding = 2) uniform sampler2DShadow shadow_compare;
-layout(binding = 3) uniform sampler2D shadow_moments;   // means of u and u^2, half the size, with mips
-layout(binding = 7) uniform sampler2D tap_table;        // row 0: search, row 1: filter; unit disc
 
 const int LIGHT_TEXELS = 8;
 const int POINT = 0, SUN = 1, AREA = 2;
-const float SHADOW_NEAR = 0.02;
-const float BIAS_M = 0.0015;
-const float SHARP_TEXELS = 3.0, SOFT_TEXELS = 8.0;   // radius of the penumbra: below, above, blended between
-const float LEAK = 0.1;          // share of light that overlapping occluders let through, cut off
-const float STEEPEST = 12.0;     // tangent of the steepest receiver that is followed
-const float DARK = 0.98;         // share of the search that is blocked where nothing more is looked for
 const float PI = 3.14159265;
-const int TILE_COLUMNS = 6;
-uniform int search_taps;
-uniform int filter_taps;
-uniform float tile_px;
 
 struct Light {
     vec3 position;
@@ -39,138 +26,6 @@ Light light_at(int i) {
     for (int k = 0; k < LIGHT_TEXELS; ++k) t[k] = texelFetch(light_table, ivec2(k, i), 0);
     return Light(t[0].xyz, t[0].w, t[1].xyz, t[1].w, t[2].w, t[2].rgb, t[3].xyz, t[4].xyz, t[3].w, t[4].w,
                  int(t[5].x), int(t[5].y), int(t[5].z), t[5].w, t[6].xyz, t[7].xyz);
-}
-
-// Where a receiver is in its tile. u = 1 - window depth is near / z (of the sun: 1 - z / range), which is
-// linear over the tile for every plane.
-struct Receiver {
-    vec2 corner, centre;   // of the tile and of the receiver, 0..1 of the atlas
-    vec2 to_atlas;         // tile units to 0..1 of the atlas
-    vec2 slope;            // of u of the plane, per tile unit
-    float u;
-    float bias;            // of u
-    float texel, tile_size;   // of the depth; tile units
-    mat2 spread;           // how far the light's half axes move a shadow, per difference of u; tile units
-    float search;          // radius of what may shade it, tile units
-    bool inside;           // the tile; beyond the sun's nothing casts shadows
-};
-
-Receiver receiver_of(Light light, vec3 d, vec3 n) {
-    bool one = light.tile_count == 1;
-    vec3 a = abs(d);
-    int axis = a.x >= a.y && a.x >= a.z ? 0 : a.y >= a.z ? 1 : 2;
-    float side = d[axis] < 0.0 ? -1.0 : 1.0;
-    int e = axis == 2 ? 0 : axis + 1, f = e == 2 ? 0 : e + 1;
-    mat3 axes = transpose(mat3(light.right, light.up, light.direction));
-    mat3 sides = transpose(mat3(vec3(e == 0, e == 1, e == 2), vec3(f == 0, f == 1, f == 2),
-                                side * vec3(axis == 0, axis == 1, axis == 2)));
-    if (!one) axes = sides;
-    vec3 q = axes * d, m = axes * n;
-    int tile = light.first_tile + (one ? 0 : 2 * axis + (side < 0.0 ? 1 : 0));
-    bool sun = light.kind == SUN;
-
-    Receiver r;
-    vec2 atlas = 2.0 * vec2(textureSize(shadow_moments, 0));
-    vec2 at = sun ? q.xy : q.xy / q.z;
-    float facing = sun ? m.z : dot(m, q);
-    float toward = (facing < 0.0 ? -1.0 : 1.0) / max(abs(facing), 1e-6);
-    r.u = sun ? 1.0 - q.z / light.range_m : SHADOW_NEAR / q.z;
-    r.slope = m.xy * toward * (sun ? 1.0 / light.range_m : SHADOW_NEAR);
-    float steep = sun ? STEEPEST / light.range_m : STEEPEST * r.u;
-    r.slope *= min(1.0, steep / max(length(r.slope), 1e-12));
-    r.bias = sun ? BIAS_M / light.range_m : BIAS_M * r.u * r.u / SHADOW_NEAR;
-    r.tile_size = 2.0 / light.focal;
-    r.texel = r.tile_size / tile_px;
-    r.inside = !sun || max(abs(at.x), abs(at.y)) < 0.5 * r.tile_size;
-    r.to_atlas = tile_px / (atlas * r.tile_size);
-    r.corner = vec2(tile % TILE_COLUMNS, tile / TILE_COLUMNS) * tile_px / atlas;
-    r.centre = r.corner + r.to_atlas * (0.5 * r.tile_size + at);
-    float per_u = sun ? light.range_m : 1.0 / SHADOW_NEAR;
-    vec3 w = axes * light.half_width, h = axes * light.half_height;
-    bool area = light.kind == AREA;
-    r.spread = area ? per_u * mat2(w.xy - at * w.z, h.xy - at * h.z) : mat2(per_u * light.radius_m);
-    float size = max(length(r.spread[0]), length(r.spread[1]));
-    float nearest = sun ? 1.0 - r.u : 2.0 * r.u;    // difference of u to the nearest blocker looked for
-    float widest = max(light.border - 0.01, 2.0 * r.texel);
-    r.search = clamp(size * nearest, 2.0 * r.texel, sun ? light.border : widest);
-    return r;
-}
-
-// Light that reaches the receiver's plane at `offset` past what the shadow map holds within `width` of there
-// (both tile units), by Chebyshev's inequality (Donnelly and Lauritzen 2006); exact for one occluder
-// in front of the plane. blocked: summed u of the occluders (Yang et al. 2010).
-float soft_tap(Receiver r, vec2 offset, float width, out float blocked) {
-    vec2 inside = r.to_atlas * min(width, 0.5 * r.tile_size);
-    vec2 uv = clamp(r.centre + r.to_atlas * offset, r.corner + inside, r.corner + r.to_atlas * r.tile_size - inside);
-    float level = log2(max(width / (2.0 * r.texel), 1.0));
-    vec2 moments = textureLod(shadow_moments, uv, level).xy;
-    float limit = r.u + dot(r.slope, (uv - r.centre) / r.to_atlas);
-    float in_front = max(moments.x - limit - r.bias, 0.0);
-    float variance = max(moments.y - moments.x * moments.x, 0.0);
-    float lit = in_front > 0.0 ? variance / (variance + in_front * in_front) : 1.0;
-    blocked = moments.x - lit * limit;
-    return lit;
-}
-
-// Is there nothing but the receiver's own plane within `width`? Then no light is lost.
-bool alone(Receiver r, float width) {
-    vec2 inside = r.to_atlas * min(width, 0.5 * r.tile_size);
-    vec2 uv = clamp(r.centre, r.corner + inside, r.corner + r.to_atlas * r.tile_size - inside);
-    vec2 moments = textureLod(shadow_moments, uv, log2(max(width / (2.0 * r.texel), 1.0))).xy;
-    float limit = r.u + dot(r.slope, (uv - r.centre) / r.to_atlas);
-    float variance = moments.y - moments.x * moments.x;
-    float own = dot(r.slope, r.slope) * width * width;
-    return abs(moments.x - limit) < 0.3 * r.bias && variance < own + r.bias * r.bias;
-}
-
-// Share of the light seen from `position`: soft shadows by the mean depth of what is in the way
-// (Fernando 2005), with fixed taps that are areas and not points, so that they leave no pattern; where the
-// penumbra is a few texels, a percentage-closer filter on the depth itself. wanted: false asks nothing.
-// even_m: how far from here, in metres, the result is as smooth as its filter makes it.
-float visibility(Light light, vec3 position, vec3 face_normal, bool wanted, out float even_m) {
-    Receiver r = receiver_of(light, position - light.position, face_normal);
-    float shaded = 0.0, blocked_sum = 0.0, blocked;
-    int taps = wanted && r.inside && !alone(r, 1.2 * r.search) ? search_taps : 0;
-    mat2 search = r.spread * (r.search / max(max(length(r.spread[0]), length(r.spread[1])), 1e-12));
-    float width = 0.3 * r.search;
-    int i = 0;
-    do {
-        vec2 offset = search * texelFetch(tap_table, ivec2(i, 0), 0).xy;
-        float lit = soft_tap(r, offset, width, blocked);
-        shaded += i < taps ? 1.0 - lit : 0.0;
-        blocked_sum += i < taps ? blocked : 0.0;
-    } while (++i < taps);
-    bool dark = shaded > DARK * float(search_taps);
-    bool mixed = shaded >= 1e-4 && !dark;
-    float nearer = max(blocked_sum / max(shaded, 1e-4) - r.u, 0.0);
-    mat2 spread = r.spread * nearer;
-    float size = max(length(spread[0]), length(spread[1]));
-    float wide = clamp(size, 0.75 * r.texel, r.search);
-    spread = size > 1e-12 ? spread * (wide / size) : mat2(wide);
-    float soft = smoothstep(SHARP_TEXELS, SOFT_TEXELS, wide / r.texel);
-
-    float sharp_lit = 0.0, bias = r.bias + (abs(r.slope.x) + abs(r.slope.y)) * r.texel;
-    int sharp = mixed && soft < 1.0 ? filter_taps : 0;
-    i = 0;
-    do {
-        vec2 offset = spread * texelFetch(tap_table, ivec2(i, 1), 0).xy;
-        float limit = r.u + dot(r.slope, offset) + bias;
-        sharp_lit += textureLod(shadow_compare, vec3(r.centre + r.to_atlas * offset, 1.0 - limit), 0.0);
-    } while (++i < sharp);
-    float soft_lit = 0.0;
-    int smooth_taps = mixed && soft > 0.0 ? filter_taps : 0;
-    i = 0;
-    do {
-        vec2 offset = spread * texelFetch(tap_table, ivec2(i, 1), 0).xy;
-        soft_lit += soft_tap(r, offset, 0.3 * wide, blocked);
-    } while (++i < smooth_taps);
-    soft_lit /= float(filter_taps);
-    float dim = 1.0 - soft_lit;
-    soft_lit = max(soft_lit - LEAK * dim * dim * dim, 0.0);
-    float lit = mix(sharp_lit / float(filter_taps), soft_lit, soft);
-    float even = r.inside ? mixed ? 0.5 * (wide + r.texel) : taps > 0 ? r.search : 1.2 * r.search : 1e9;
-    even_m = wanted ? even * (light.kind == SUN ? 1.0 : SHADOW_NEAR / r.u) : 0.0;
-    return mixed ? lit : dark ? 0.0 : 1.0;
 }
 
 // Irradiance at normal incidence of a point, spot or sun, without shadow; to_light is unit.
@@ -216,17 +71,4 @@ float form_factor(Light light, vec3 position, mat3 bend, int edges) {
 mat3 upright(vec3 n) {
     vec3 aside = normalize(cross(n, abs(n.x) < 0.7 ? vec3(1, 0, 0) : vec3(0, 1, 0)));
     return transpose(mat3(aside, cross(n, aside), n));
-}
-
-// GGX with height-correlated Smith masking (Heitz 2014) and Schlick's Fresnel: f * cos at the light.
-vec3 reflected(vec3 f0, float alpha, vec3 n, vec3 v, vec3 l) {
-    vec3 h = normalize(v + l);
-    float nl = max(dot(n, l), 0.0), nv = max(abs(dot(n, v)), 1e-3), nh = max(dot(n, h), 0.0);
-    float a2 = alpha * alpha;
-    float t = nh * nh * (a2 - 1.0) + 1.0;
-    float d = a2 / (PI * t * t);
-    float g = nl * sqrt(nv * nv * (1.0 - a2) + a2) + nv * sqrt(nl * nl * (1.0 - a2) + a2);
-    float s = clamp(1.0 - dot(v, h), 0.0, 1.0), s2 = s * s;
-    vec3 f = f0 + (1.0 - f0) * (s2 * s2 * s);
-    return f * (d * 0.5 * nl / max(g, 1e-4));
 }

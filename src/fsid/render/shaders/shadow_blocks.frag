@@ -3,6 +3,7 @@
 // varies smoothly: light after light from top to bottom, blocks.y rows each. 2: not smooth enough for that.
 #include "encoding.glsl"
 #include "lights.glsl"
+#include "shadows.glsl"
 #include "lens.glsl"
 layout(binding = 0) uniform usampler2D samples;
 uniform ivec2 blocks;

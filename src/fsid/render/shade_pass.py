@@ -1,0 +1,148 @@
+"""Shading: materials and radiance of each pixel, once per surface in it; glass over it in a second round.
+
+What a scene does not have costs nothing: a program is compiled for each combination of lens, layers, area
+lights, glass and mirror that occurs.
+"""
+
+from __future__ import annotations
+
+import moderngl
+import numpy as np
+
+from fsid.render.buffers import Buffers
+from fsid.render.exposure import Shot
+from fsid.render.frustum import rectangles
+from fsid.render.layers import LayerStore
+from fsid.render.programs import load_program, set_uniforms
+from fsid.render.quality import Quality
+from fsid.render.reflectance import lobe_table, reflectance_table
+from fsid.render.shadow_pass import ShadowPass
+from fsid.render.stage import Stage
+from fsid.render.targets import Place, Targets
+
+
+class ShadePass:
+    """Owns the programs and the table of what GGX reflects. grid: as in `Targets`."""
+
+    def __init__(self, context: moderngl.Context, quality: Quality, grid: int, shadows: ShadowPass) -> None:
+        self._context = context
+        self._quality = quality
+        self._grid = grid
+        self._shadows = shadows
+        self._programs: dict[tuple[tuple[str, int], ...], moderngl.Program] = {}
+        self._copy = load_program(context, "screen.vert", "copy_result.frag")
+        shares = reflectance_table()
+        table = np.concatenate([np.concatenate([shares, np.zeros_like(shares)], axis=-1), lobe_table()])
+        self._reflectance = context.texture(table.shape[1::-1], 4, table.tobytes(), dtype="f4")
+        self._reflectance.repeat_x = self._reflectance.repeat_y = False
+
+    def draw(
+        self,
+        targets: Targets,
+        stage: Stage,
+        buffers: Buffers,
+        shot: Shot,
+        layers: LayerStore,
+        *,
+        mirror: Targets | None = None,
+        shining: bool = True,
+    ) -> None:
+        """Everything but glass. mirror: the image that smooth ground shows. shining: whether what emits light
+        is seen to."""
+        targets.begin_shading()
+        if mirror is not None:
+            mirror.use_mirror(11)
+        program = self._program(shot.lens.model, stage, GLASS=0, PLANAR=int(mirror is not None))
+        set_uniforms(program, block_lights=targets.block_lights, shining=float(shining))
+        self._shade(program, targets, stage, buffers, shot, layers)
+
+    def draw_glass(
+        self, targets: Targets, stage: Stage, buffers: Buffers, shot: Shot, layers: LayerStore
+    ) -> None:
+        """Glass over the result so far."""
+        targets.begin_glass(_places(stage.geometry.spheres[stage.glass], shot, targets.size))
+        program = self._program(shot.lens.model, stage, GLASS=1, PLANAR=0)
+        set_uniforms(program, block_lights=0, shining=1.0)
+        self._shade(program, targets, stage, buffers, shot, layers)
+        targets.end_glass()
+        targets.draw(lambda: buffers.draw_screen(self._copy))
+
+    def _shade(
+        self,
+        program: moderngl.Program,
+        targets: Targets,
+        stage: Stage,
+        buffers: Buffers,
+        shot: Shot,
+        layers: LayerStore,
+    ) -> None:
+        _set_view(program, targets, shot)
+        _set_surroundings(program, stage, shot)
+        camera = stage.view.camera
+        set_uniforms(
+            program,
+            light_count=stage.plan.light_count,
+            max_probes=self._quality.probes,
+            vignetting=camera.vignetting,
+        )
+        layers.use(0, 1)
+        self._shadows.use(program, stage.plan)
+        self._reflectance.use(14)
+        buffers.use()
+        red, blue = camera.chromatic_aberration
+        for aberration, colours in _colour_passes(red, blue):
+            set_uniforms(program, magnification=1.0 + aberration)
+            targets.draw(lambda: buffers.draw_screen(program), colours)
+
+    def _program(self, lens_model: int, stage: Stage, **defines: int) -> moderngl.Program:
+        defines |= {"LENS": lens_model, "LOBES": int(stage.has_lobes), "AREAS": int(stage.has_areas)}
+        key = tuple(defines.items())
+        if key not in self._programs:
+            self._programs[key] = load_program(
+                self._context, "screen.vert", "shade.frag", GRID=self._grid, **defines
+            )
+        return self._programs[key]
+
+
+def _set_view(program: moderngl.Program, targets: Targets, shot: Shot) -> None:
+    lens = shot.lens
+    set_uniforms(
+        program,
+        size=targets.size,
+        seen=targets.seen,
+        focal=lens.focal,
+        seen_focal=lens.seen_focal,
+        seen_shift=shot.seen_shift,
+        shift=shot.shift_px,
+        lens_offset=shot.lens_offset,
+        k=lens.k,
+        axes=lens.rotation.T,
+        origin=lens.position,
+    )
+
+
+def _set_surroundings(program: moderngl.Program, stage: Stage, shot: Shot) -> None:
+    room, sky, pixel_rad = stage.room, stage.sky, 2.0 / (shot.lens.focal[0] * stage.view.camera.width)
+    set_uniforms(
+        program,
+        ambient_sides=room.sides,
+        mean_sides=room.radiance.mean((1, 2)),
+        room_half=room.half_m,
+        room_centre=room.centre_m,
+        sky_level=-1.0 if sky is None else max(float(np.log2(pixel_rad * len(sky) / np.pi)), 0.0),
+    )
+
+
+def _places(spheres: np.ndarray, shot: Shot, size: tuple[int, int]) -> list[Place]:
+    """Parts of the image that hold the spheres; of a bent image all of it."""
+    lens = shot.lens
+    if lens.model:
+        return [(0, 0, *size)]
+    return rectangles(spheres, lens.position, lens.rotation, lens.seen_focal, shot.seen_shift, lens.seen_px)
+
+
+def _colour_passes(red: float, blue: float) -> list[tuple[float, tuple[bool, bool, bool]]]:
+    """(magnification - 1, which of R, G, B) of each pass; labels belong to green."""
+    if red == blue == 0.0:
+        return [(0.0, (True, True, True))]
+    return [(red, (True, False, False)), (0.0, (False, True, False)), (blue, (False, False, True))]

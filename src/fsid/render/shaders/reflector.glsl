@@ -1,0 +1,107 @@
+// What a surface does with light that arrives: GGX over a matt body, under clearcoat and cloth's fuzz.
+const float COAT_F0 = 0.04;   // index 1.5
+
+// GGX with height-correlated Smith masking (Heitz 2014) and Schlick's Fresnel: f * cos at the light.
+vec3 reflected(vec3 f0, float alpha, vec3 n, vec3 v, vec3 l) {
+    vec3 h = normalize(v + l);
+    float nl = max(dot(n, l), 0.0), nv = max(abs(dot(n, v)), 1e-3), nh = max(dot(n, h), 0.0);
+    float a2 = alpha * alpha;
+    float t = nh * nh * (a2 - 1.0) + 1.0;
+    float d = a2 / (PI * t * t);
+    float g = nl * sqrt(nv * nv * (1.0 - a2) + a2) + nv * sqrt(nl * nl * (1.0 - a2) + a2);
+    float s = clamp(1.0 - dot(v, h), 0.0, 1.0), s2 = s * s;
+    vec3 f = f0 + (1.0 - f0) * (s2 * s2 * s);
+    return f * (d * 0.5 * nl / max(g, 1e-4));
+}
+
+#if LOBES
+// Cloth's fuzz of roughness 0.5 (Estevez and Kulla 2017) with the visibility of Neubelt and Pettineo (2013); f * cos.
+float fuzz(vec3 n, vec3 v, vec3 l) {
+    float nl = max(dot(n, l), 0.0), nv = max(abs(dot(n, v)), 1e-3), nh = dot(n, normalize(v + l));
+    return (2.0 / PI) * max(1.0 - nh * nh, 0.0) * nl / (4.0 * max(nl + nv - nl * nv, 1e-3));
+}
+
+// Share of light that it reflects: the integral of `fuzz`, fitted to 0.004.
+float fuzz_share(float nv) {
+    float r = sqrt(nv);
+    return 0.787036 + r * (-0.717702 + r * (-0.122279 + r * 0.137787));
+}
+#endif
+
+// What a surface reflects of light from anywhere, at one point and seen from one side.
+struct Reflector {
+    vec3 n, v, r;         // normal, to the viewer, mirrored viewer
+    vec3 diffuse;         // albedo of the body
+    vec3 f0;
+    float alpha, alpha2;  // GGX
+    vec3 rebound;         // what one bounce between microfacets loses, given back (Turquin 2019)
+    vec3 mirror;          // share of even surroundings that the GGX lobe reflects
+#if LOBES
+    // The layers above take their share of what arrives at those below.
+    float coat, coated, coat_alpha, sheen, cloth, below;
+    vec3 through;         // diffuse light that leaves on the other side
+#endif
+};
+
+Reflector reflector_of(Sample p, Surface s, Matter m, float spread) {
+    Reflector b;
+    b.v = normalize(origin - p.position);
+    b.n = normalize(m.normal);
+    b.r = reflect(-b.v, b.n);
+    b.alpha2 = min(m.alpha2 + 2.0 * spread, 1.0);
+    b.alpha = sqrt(b.alpha2);
+    b.diffuse = m.albedo * ((1.0 - m.metallic) * (1.0 - s.specular));
+    float nv = max(abs(dot(b.n, b.v)), 1e-3);
+#if GLASS
+    b.diffuse *= 1.0 - s.transmission;
+#endif
+#if LOBES
+    vec2 coat_share = mirror_share(sqrt(s.clearcoat_alpha), nv);
+    b.coat_alpha = s.clearcoat_alpha;
+    b.sheen = s.sheen;
+    b.cloth = s.sheen * fuzz_share(nv);
+    b.coated = s.clearcoat * (1.0 - b.cloth);
+    float coat = s.clearcoat * (COAT_F0 * coat_share.x + coat_share.y);
+    b.below = (1.0 - coat) * (1.0 - b.cloth);
+    b.coat = coat * (1.0 - b.cloth);
+    b.through = b.diffuse * s.translucency * b.below;
+    b.diffuse *= 1.0 - s.translucency;
+#endif
+    b.f0 = mix(vec3(s.specular), m.albedo, m.metallic);
+    vec2 share = mirror_share(sqrt(b.alpha), nv);
+    b.rebound = 1.0 + b.f0 * (1.0 / max(share.x + share.y, 0.1) - 1.0);
+    b.mirror = b.rebound * (b.f0 * share.x + min(share.y, 50.0 * max(b.f0.r, max(b.f0.g, b.f0.b))));
+    return b;
+}
+
+// What of a light's radiance or intensity leaves towards the viewer, shadows aside.
+vec3 returned(Light light, Sample p, Reflector b) {
+    vec3 to_light = light.kind == SUN ? -light.direction : light.position - p.position;
+    float distance_m = max(length(to_light), 1e-6);
+    vec3 l = to_light / distance_m;
+    float ahead = dot(p.face_normal, l), nl = dot(b.n, l);
+    float angular = light.kind == SUN ? light.radius_m : light.radius_m / max(distance_m, light.radius_m);
+    float wide = min(sqrt(b.alpha2 + 0.25 * angular * angular), 1.0);
+    vec3 unhindered = arriving(light, l, distance_m);
+    vec3 arrives = unhindered * smoothstep(-0.15, 0.0, ahead);
+    vec3 result = (b.diffuse * (max(nl, 0.0) / PI) + b.rebound * reflected(b.f0, wide, b.n, b.v, l)) * arrives;
+#if LOBES
+    float coat_wide = min(sqrt(b.coat_alpha * b.coat_alpha + 0.25 * angular * angular), 1.0);
+    result = result * b.below + b.through * unhindered * (smoothstep(-0.15, 0.0, -ahead) * max(-nl, 0.0) / PI)
+        + (b.coated * reflected(vec3(COAT_F0), coat_wide, b.n, b.v, l) + b.sheen * fuzz(b.n, b.v, l)) * arrives;
+#endif
+#if AREAS
+    bool area = light.kind == AREA;
+    int edges = area && dot(to_light, light.direction) < 0.0 ? 5 : 0;
+    float front = form_factor(light, p.position, upright(b.n), edges);
+    float glossy = form_factor(light, p.position, lobe_of(sqrt(b.alpha), b.n, b.v), edges);
+    vec3 from_area = b.diffuse * front + b.mirror * glossy;
+#if LOBES
+    from_area = from_area * b.below + b.cloth * front
+        + b.coat * form_factor(light, p.position, lobe_of(sqrt(b.coat_alpha), b.n, b.v), edges)
+        + b.through * form_factor(light, p.position, upright(-b.n), edges);
+#endif
+    result = area ? edges > 0 ? light.colour * from_area : vec3(0) : result;
+#endif
+    return result;
+}

@@ -1,0 +1,58 @@
+"""The image that the shadow maps of all lights share."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import moderngl
+
+
+class ShadowAtlas:
+    """One depth image that holds the tiles of all lights, and its moments at half the size."""
+
+    def __init__(self, context: moderngl.Context) -> None:
+        self._context = context
+        self._size = (0, 0)
+        self._owned: list[Any] = []
+        self._sampler = context.sampler(
+            repeat_x=False, repeat_y=False, filter=(moderngl.LINEAR, moderngl.LINEAR), compare_func="<="
+        )
+
+    def resize(self, size: tuple[int, int]) -> None:
+        """Make the image for `size` texels, unless it is there."""
+        if self._size == size:
+            return
+        for item in self._owned:
+            item.release()
+        self._depth = self._context.depth_texture(size)
+        self._depth.compare_func = ""
+        self._depth.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self._depth.repeat_x = self._depth.repeat_y = False
+        self._moments = self._context.texture((size[0] // 2, size[1] // 2), 2, dtype="f4")
+        self._moments.build_mipmaps()
+        self._moments.filter = (moderngl.LINEAR_MIPMAP_NEAREST, moderngl.LINEAR)
+        self.framebuffer = self._context.framebuffer([], self._depth)
+        self._to_moments = self._context.framebuffer([self._moments])
+        self._owned = [self.framebuffer, self._to_moments, self._depth, self._moments]
+        self._size = size
+
+    def begin(self) -> None:
+        """Draw depth of all tiles, from nothing."""
+        self.framebuffer.use()
+        self.framebuffer.viewport = (0, 0, *self._size)
+        self.framebuffer.clear(depth=1.0)
+
+    def begin_moments(self) -> None:
+        """Draw the moments; unit 0 holds the depth."""
+        self._depth.use(0)
+        self._to_moments.use()
+
+    def end_moments(self) -> None:
+        """Average them into mip levels."""
+        self._moments.build_mipmaps()
+
+    def use(self, compare_unit: int, moments_unit: int) -> None:
+        """Bind depth for filtered comparison, and the moments."""
+        self._depth.use(compare_unit)
+        self._sampler.use(compare_unit)
+        self._moments.use(moments_unit)

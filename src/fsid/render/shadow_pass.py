@@ -1,0 +1,106 @@
+"""Shadows in two passes: depth from every light into the tiles of one atlas, with its first two moments; and
+the share of each light that reaches one sample per block of 2 x 2 pixels, which shading interpolates."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import moderngl
+import numpy as np
+
+from fsid.render.buffers import Buffers
+from fsid.render.exposure import Shot
+from fsid.render.frustum import in_view, sees
+from fsid.render.geometry import draw_commands
+from fsid.render.programs import load_program, set_uniforms
+from fsid.render.quality import Quality
+from fsid.render.shadow_atlas import ShadowAtlas
+from fsid.render.shadows import NEAR_M, ShadowPlan, Tile
+from fsid.render.stage import Stage
+from fsid.render.targets import Targets
+
+
+class ShadowPass:
+    """Owns the atlas. taps: the texture of `fsid.render.quality.tap_table`. grid: as in `Targets`."""
+
+    def __init__(
+        self, context: moderngl.Context, quality: Quality, grid: int, taps: moderngl.Texture
+    ) -> None:
+        self._context = context
+        self._quality = quality
+        self._taps = taps
+        self._atlas = ShadowAtlas(context)
+        self._depth = load_program(context, "depth.vert", None)
+        self._moments = load_program(context, "screen.vert", "moments.frag")
+        self._blocks = load_program(context, "screen.vert", "shadow_blocks.frag", LENS=0, GRID=grid)
+
+    def resize(self, plan: ShadowPlan) -> None:
+        """Make the atlas as large as the plan says."""
+        self._atlas.resize(plan.size)
+
+    def draw(self, stage: Stage, buffers: Buffers, shots: Sequence[Shot]) -> None:
+        """The tiles that any of the shots can see, and the moments of all."""
+        geometry, lens = stage.geometry, shots[0].lens
+        centres, radii = geometry.spheres[:, :3], geometry.spheres[:, 3]
+        deepest = float((np.linalg.norm(centres - lens.position, axis=1) + radii).max())
+        deepest += 2 * abs(float(lens.position[2]))
+        self._context.enable_only(moderngl.DEPTH_TEST)
+        self._atlas.begin()
+        array = buffers.vertex_array(self._depth)
+        set_uniforms(self._depth, near=NEAR_M)
+        for tile in stage.plan.tiles:
+            if not any(sees(shot, tile, deepest) for shot in shots):
+                continue
+            self._atlas.framebuffer.viewport = (*tile.corner, stage.plan.tile_px, stage.plan.tile_px)
+            set_uniforms(
+                self._depth,
+                origin=tile.origin,
+                axes=tile.axes.T,
+                focal=tile.focal,
+                range_m=tile.range_m,
+            )
+            buffers.draw(array, draw_commands(geometry.ranges, _casters(stage, tile)))
+        self._context.enable_only(moderngl.NOTHING)
+        self._atlas.begin_moments()
+        buffers.draw_screen(self._moments)
+        self._atlas.end_moments()
+
+    def draw_blocks(self, targets: Targets, stage: Stage, buffers: Buffers, shot: Shot) -> None:
+        """What reaches the blocks of an image whose G-buffer is drawn."""
+        lens = shot.lens
+        set_uniforms(
+            self._blocks,
+            blocks=targets.blocks,
+            through=stage.has_lobes,
+            seen=targets.seen,
+            seen_focal=lens.seen_focal,
+            seen_shift=shot.seen_shift,
+            axes=lens.rotation.T,
+            origin=lens.position,
+        )
+        self.use(self._blocks, stage.plan)
+        buffers.use()
+        targets.begin_shadow_blocks(stage.plan.light_count)
+        buffers.draw_screen(self._blocks)
+
+    def use(self, program: moderngl.Program, plan: ShadowPlan) -> None:
+        """Bind what shaders/shadows.glsl needs, but for the table of the lights."""
+        set_uniforms(
+            program,
+            tile_px=float(plan.tile_px),
+            search_taps=self._quality.search_taps,
+            filter_taps=self._quality.filter_taps,
+        )
+        self._atlas.use(compare_unit=2, moments_unit=3)
+        self._taps.use(7)
+
+
+def _casters(stage: Stage, tile: Tile) -> np.ndarray:
+    """Numbers of the drawables that can shade something in the tile."""
+    seen = stage.casts.copy()
+    if tile.range_m == 0:
+        tangent = 1.0 / tile.focal
+        seen &= in_view(stage.geometry.spheres, tile.origin, tile.axes, (tangent, tangent))
+    if tile.lamp >= 0:
+        seen[tile.lamp] = False
+    return np.flatnonzero(seen)
