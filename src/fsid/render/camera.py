@@ -24,6 +24,7 @@ MODELS = {"brown-conrady": (1, 5), "fisheye": (2, 4)}
 """Distortion model -> its number in shaders/lens.glsl and how many coefficients it has."""
 
 _STRAIGHT = 3
+_MAX_SOFTNESS_PX = 50.0
 """LENS of shaders/lens.glsl that looks a pinhole image up in a larger one."""
 
 _WIDEST_TANGENT = 6.0
@@ -60,6 +61,8 @@ def lens_of(camera: Camera, time_s: float | None = None) -> Lens:
         raise FsidError(f"scene.cameras: fov_deg = {camera.fov_deg}: must be between 0 and 175")
     if not (camera.exposure_s >= 0 and camera.aperture_m >= 0 and camera.focus_m > 0):
         raise FsidError("scene.cameras: exposure_s and aperture_m must be 0 or more, focus_m more than 0")
+    if not 0 <= camera.softness_px <= _MAX_SOFTNESS_PX:
+        raise FsidError(f"scene.cameras: softness_px {camera.softness_px}: must be 0 .. {_MAX_SOFTNESS_PX:g}")
     forward /= np.linalg.norm(forward)
     right /= np.linalg.norm(right)
     rotation = np.stack([right, np.cross(right, forward), forward])

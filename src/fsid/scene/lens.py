@@ -1,4 +1,4 @@
-"""Lenses: distortion that can be inverted over the whole image, depth of field, dark corners, fringes.
+"""Lenses: distortion that can be inverted over the whole image, blur, dark corners, fringes.
 
     Brown-Conrady   r_d = r (1 + k1 r^2 + k2 r^4 + k3 r^6),  plus a small decentring (p1, p2)
     fisheye         theta_d = theta (1 + k1 theta^2 + ...),  theta the angle from the axis
@@ -31,12 +31,13 @@ _DECENTRING = 0.0005
 
 def lens_rand(rng: np.random.Generator, config: LensConfig, camera: Camera) -> Camera:
     """The camera with a lens of its own; every number is drawn, whatever the shares leave out."""
-    distorted, fisheye, blurred, vignetted, fringed = rng.random(5) < (
+    distorted, fisheye, blurred, vignetted, fringed, soft = rng.random(6) < (
         config.distortion_share,
         config.fisheye_share,
         config.blur_share,
         config.vignetting_share,
         config.fringe_share,
+        config.soft_share,
     )
     corner = corner_radius(camera)
     displacement, second = rng.uniform(*config.distortion), rng.uniform(-0.3, 0.3)
@@ -45,6 +46,7 @@ def lens_rand(rng: np.random.Generator, config: LensConfig, camera: Camera) -> C
     aperture_m, focus = log_uniform_rand(rng, config.aperture_m), rng.uniform(*config.focus)
     loss, power = rng.uniform(*config.vignetting), rng.dirichlet((2.0, 1.0, 0.5))
     fringe = rng.uniform(*config.fringe, 2)
+    softness_px = float(rng.uniform(*config.softness_px))
     if fisheye:
         camera = _fisheye(camera, bend)
     elif distorted:
@@ -57,7 +59,7 @@ def lens_rand(rng: np.random.Generator, config: LensConfig, camera: Camera) -> C
         camera = replace(camera, vignetting=(a1, a2, a3))
     if fringed:
         camera = replace(camera, chromatic_aberration=(float(fringe[0]), float(fringe[1])))
-    return camera
+    return replace(camera, softness_px=softness_px) if soft else camera
 
 
 def corner_radius(camera: Camera) -> float:

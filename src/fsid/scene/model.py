@@ -156,6 +156,7 @@ class Camera:
     aperture_m: diameter of the lens opening, 0 = everything is sharp. focus_m: depth of the sharp plane.
     vignetting: a1, a2, a3 of gain = 1 + a1 r^2 + a2 r^4 + a3 r^6, r = 1 in the corner of the image.
     chromatic_aberration: magnification of red and of blue relative to green, minus 1.
+    softness_px: standard deviation of the point spread (Gaussian) of lens and low-pass filter; 0 = none.
     """
 
     position_m: Vec3
@@ -175,6 +176,7 @@ class Camera:
     distortion: Distortion | None = None
     vignetting: Vec3 = ZERO
     chromatic_aberration: tuple[float, float] = (0.0, 0.0)
+    softness_px: float = 0.0
 
 
 @dataclass(frozen=True)
