@@ -17,6 +17,7 @@ PALETTES = ("natural", "harmonised", "lab", "grey")
 """natural: muted, mostly earth, leaf and sky hues. harmonised: one hue per scene. lab: anything in gamut."""
 
 _XYZ_TO_RGB = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 _WHITE = np.array([0.9505, 1.0, 1.089])
 _DESATURATED = np.array([(1.0, keep, keep) for keep in (1.0, 0.8, 0.6, 0.4, 0.2, 0.0)])
 _NATURAL_HUES_DEG = (62.0, 80.0, 108.0, 138.0, 262.0, 35.0, 15.0, 320.0)
@@ -27,19 +28,22 @@ class Mood(NamedTuple):
     """What the colours of one scene share, as those of one photograph do.
 
     hue_deg: CIELAB hue that the harmonised palette keeps to. hues_deg: three to five of the natural hues.
-    chroma: factor on all chromas but lab's.
+    chroma: factor on all chromas but lab's. variation: of chromaticity within one material, 0 none .. 1 all.
     """
 
     hue_deg: float
     hues_deg: tuple[float, ...]
     chroma: float
+    variation: float
 
 
-def mood_rand(rng: np.random.Generator) -> Mood:
-    """A hue, and how colourful the scene is: most are muted, some vivid."""
+def mood_rand(rng: np.random.Generator, calm_share: float, variation: tuple[float, float]) -> Mood:
+    """Hues, how colourful the scene is (mostly muted), and how far its textures vary in colour."""
     hue_deg, count = float(rng.uniform(0, 360)), int(rng.integers(3, 6))
     hues_deg = rng.choice(_NATURAL_HUES_DEG, 5, replace=False, p=_NATURAL_SHARES) + rng.normal(0, 10, 5)
-    return Mood(hue_deg, tuple(hues_deg[:count].tolist()), float(np.exp(rng.normal(0.0, 0.6))))
+    chroma = float(np.exp(rng.normal(0.0, 0.6)))
+    varied, left = rng.random() < 1 - calm_share, float(rng.uniform(*variation))
+    return Mood(hue_deg, tuple(hues_deg[:count].tolist()), chroma, 1.0 if varied else left)
 
 
 def lab_to_rgb(lab: np.ndarray) -> np.ndarray:
@@ -72,7 +76,7 @@ def blackbody_rgb(temperature_k: float) -> np.ndarray:
     z = 1.217 * lobe(437.0, 0.0845, 0.0278) + 0.681 * lobe(459.0, 0.0385, 0.0725)
     xyz = np.array([(radiance * curve).sum() for curve in (x, y, z)])
     rgb = np.clip(_XYZ_TO_RGB @ (xyz / xyz[1]), 0.0, None)
-    return rgb / (rgb @ (0.2126, 0.7152, 0.0722))
+    return rgb / (rgb @ _LUMINANCE)
 
 
 def lab_rand(rng: np.random.Generator, palette: str, mood: Mood) -> np.ndarray:
@@ -105,6 +109,17 @@ def albedo_rgb(lab: np.ndarray, low: float, high: float) -> np.ndarray:
     inside = np.asarray(((rgb >= 0) & (rgb <= 1)).all(axis=2))
     inside[:, -1] = True
     return np.clip(rgb[np.arange(len(rgb)), inside.argmax(1)], low, high)
+
+
+def calmed(colours: np.ndarray, variation: float) -> np.ndarray:
+    """(N, 3) linear albedos that keep a share `variation` of their distance from their common chromaticity.
+
+    colours: (N, 3) linear sRGB. Their luminance stays: in most real surfaces light and dark vary far more
+    than colour does (docs/results.md). No channel leaves the range of `colours`.
+    """
+    light = colours @ _LUMINANCE
+    common = light[:, None] * (colours.mean(axis=0) / max(float(light.mean()), 1e-6))
+    return np.clip(common + variation * (colours - common), colours.min(), colours.max())
 
 
 def _polar(chroma: float, hue_deg: float) -> tuple[float, float]:

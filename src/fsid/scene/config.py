@@ -61,6 +61,10 @@ class MaterialConfig:
     """How far the colours of one material may lie apart: 1 as drawn, 0 all alike."""
     natural_share: float = knob(0.4, 0.0, 1.0)
     """Share of materials in the colours that their family has in nature, where it has some."""
+    calm_share: float = knob(0.6, 0.0, 1.0)
+    """Share of scenes whose textures vary in light and dark more than in colour, as most real ones do."""
+    variation: Range = knob((0.15, 0.8), 0.0, 1.0)
+    """How much of the colour differences within one material is left in those scenes."""
     layer_share: float = knob(0.03, 0.0, 1.0)
     """Share of materials under dust, dirt, scratches or another layer of wear."""
     lobe_share: float = knob(0.7, 0.0, 1.0)

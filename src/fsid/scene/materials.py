@@ -15,7 +15,7 @@ from fsid.assets import (
     material_tile_m,
 )
 from fsid.scene.choice import log_uniform_rand, pick_rand
-from fsid.scene.colour import PALETTES, Mood, albedo_rgb, lab_rand, related_rand
+from fsid.scene.colour import PALETTES, Mood, albedo_rgb, calmed, lab_rand, related_rand
 from fsid.scene.config import SceneConfig
 from fsid.scene.knobs import Range
 from fsid.scene.lobes import lobes_rand
@@ -70,11 +70,14 @@ def _finished_rand(
     variant = int(rng.integers(MATERIAL_VARIANTS))
     layered, layer = rng.random() < knobs.layer_share, pick_rand(rng, material_layers())
     natural, colours = rng.random() < knobs.natural_share, _colours_rand(rng, config, mood)
-    in_nature = _colours_of(family, variant) if natural or family.startswith(FILE) else None
+    from_file = family.startswith(FILE)
+    in_nature = _colours_of(family, variant) if natural or from_file else None
+    own = np.array(in_nature or colours)
+    a, b, c = own if from_file else calmed(own, mood.variation)
     return Material(
         family=f"{family}+{layer}" if layered and family != PLAIN_FAMILY else family,
         variant=variant,
-        colours=in_nature or colours,
+        colours=(vec3(a), vec3(b), vec3(c)),
         tile_m=material_tile_m(family) * log_uniform_rand(rng, tile_scale),
         rotation_deg=float(rng.uniform(0, 360)),
         roughness_scale=float(rng.uniform(*knobs.roughness_scale)),

@@ -44,7 +44,7 @@ def background_rand(rng: np.random.Generator, config: SceneConfig) -> tuple[Back
         rng = np.random.default_rng((_FIXED_BACKGROUNDS, which % config.backgrounds))
     kind = KINDS[int(rng.choice(len(KINDS), p=config.background.kind_shares))]
     sizes = rng.random(5)
-    mood = mood_rand(rng)
+    mood = mood_rand(rng, config.materials.calm_share, config.materials.variation)
     materials = {
         name: surface_rand(child, config, mood, name)
         for child, name in zip(rng.spawn(len(BACKGROUND_PARTS[kind])), BACKGROUND_PARTS[kind], strict=True)
