@@ -7,10 +7,11 @@ read noise of the built-in profiles, each at its lowest published ISO with sigma
 site: fits of noise that could not be told from none.) Smooth: one object, and radiance within 3 % over 5 x
 5 pixels.
 
-Measured, other taps and other phase: 90.4 % and 90.0 % of smooth pixels below the 5 %; 88th percentile
-6.2e-6 and 6.4e-6, 95th 3.6e-5 and 5.3e-5; root mean square of the fine grain 3.6e-5 and 4.0e-5, which is 16
-% and 17 % of that read noise. What is left lies at the outlines of shadows and where things touch the
-floor.
+Measured at 480 x 480 pixels, other taps and other phase: 92.1 % and 95.9 % of smooth pixels below the 5 %;
+95th percentile 3.6e-5 and 7.0e-6; root mean square of the fine grain 4.1e-5 and 3.1e-5, which is 18 % and 13 % of
+that read noise. With other taps of shadows alone 99.3 %; what is left is occlusion: its taps are points, and
+how many of them an occluder covers changes with their places, smoothly from pixel to pixel. Another phase
+also sees the curvature of a smooth image, more of it the fewer the pixels.
 """
 
 from __future__ import annotations
@@ -51,18 +52,18 @@ def scene() -> View:
             point_light((-1.2, 0.5, 1.5), intensity=2.0, radius_m=0.05),
         ),
         ambient=0.1,
-        camera=replace(FROM_ABOVE, width=192, height=192),
+        camera=replace(FROM_ABOVE, width=480, height=480),
     )
 
 
-def check(difference: np.ndarray, image: np.ndarray, object_id: np.ndarray) -> None:
-    """88 % of smooth pixels below LIMIT; the root mean square of the fine grain below GRAIN."""
+def check(difference: np.ndarray, image: np.ndarray, object_id: np.ndarray, share: float) -> None:
+    """That share of smooth pixels below LIMIT; the root mean square of the fine grain below GRAIN."""
     smooth = maximum_filter(image, 5) - minimum_filter(image, 5) < 0.03 * image
     smooth &= maximum_filter(object_id, 5) == minimum_filter(object_id, 5)
     assert smooth.mean() > 0.4
     scaled = np.abs(difference) * 0.18 / image
     grain = (difference - uniform_filter(difference, 5)) * 0.18 / image
-    assert np.quantile(scaled[smooth], 0.88) < LIMIT
+    assert np.quantile(scaled[smooth], share) < LIMIT
     assert np.sqrt((grain[smooth] ** 2).mean()) < GRAIN
 
 
@@ -82,11 +83,11 @@ def test_other_taps_give_the_same_picture(renderer: Renderer) -> None:
     after = renderer.draw(scene(), bake=bake_plain)
     renderer._taps.write(taps.tobytes())
     image = before.radiance[..., 0].astype(float)
-    check(after.radiance[..., 0] - image, image, before.object_id)
+    check(after.radiance[..., 0] - image, image, before.object_id, 0.91)
     assert (after.radiance != before.radiance).any()
 
 
 def test_another_phase_gives_the_same_picture(renderer: Renderer) -> None:
     frames = [renderer.draw(scene(), bake=bake_plain, shift_px=(s, s)) for s in (-0.21, 0.0, 0.21)]
     before, still, after = (frame.radiance[..., 0].astype(float) for frame in frames)
-    check((before + after) / 2 - still, still, frames[1].object_id)
+    check((before + after) / 2 - still, still, frames[1].object_id, 0.95)
