@@ -8,10 +8,10 @@ site: fits of noise that could not be told from none.) Smooth: one object, and r
 5 pixels.
 
 Measured at 480 x 480 pixels, other taps and other phase: 92.1 % and 95.9 % of smooth pixels below the 5 %;
-95th percentile 3.6e-5 and 7.0e-6; root mean square of the fine grain 4.1e-5 and 3.1e-5, which is 18 % and 13 % of
-that read noise. With other taps of shadows alone 99.3 %; what is left is occlusion: its taps are points, and
-how many of them an occluder covers changes with their places, smoothly from pixel to pixel. Another phase
-also sees the curvature of a smooth image, more of it the fewer the pixels.
+95th percentile 3.6e-5 and 7.0e-6; root mean square of the fine grain 4.1e-5 and 3.1e-5, which is 18 % and
+13 % of that read noise. With other taps of shadows alone 99.3 %; what is left is occlusion: its taps are
+points, and how many of them an occluder covers changes with their places, smoothly from pixel to pixel.
+Another phase also sees the curvature of a smooth image, more of it the fewer the pixels.
 """
 
 from __future__ import annotations
