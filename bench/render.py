@@ -98,9 +98,7 @@ def memory(renderer: Renderer, options: argparse.Namespace) -> None:
     later = held[len(held) // 2 :]
     if len(later) > 1:
         slope = np.polyfit(np.arange(len(later)), later, 1)[0]
-        print(
-            f"{slope:+.3f} MiB per scene over the last {len(later)}: {min(later):,.0f} .. {max(later):,.0f} MiB"
-        )
+        print(f"{slope:+.3f} MiB per scene over the last {len(later)}, at most {max(later):,.0f} MiB")
 
 
 def held_mib() -> float:
