@@ -90,7 +90,7 @@ def memory(renderer: Renderer, options: argparse.Namespace) -> None:
     """What the process holds over `--frames` consecutive default scenes."""
     every, held = max(1, options.frames // 20), []
     for seed in range(options.frames):
-        renderer.render(sample(SceneConfig(), seed, width=options.width, height=options.width * 9 // 16))
+        renderer.render(sample(SceneConfig(), seed, width=options.width, height=options.width * 9 // 32 * 2))
         held.append(held_mib())
         if seed % every == every - 1:
             peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
