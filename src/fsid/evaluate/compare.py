@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
-from scipy.stats import t
+from scipy.special import stdtrit
 
 from fsid.errors import FsidError
 from fsid.evaluate.classical import denoise_classical
@@ -171,7 +171,7 @@ def confidence(values: Sequence[float]) -> float:
     """Half width of the 95 % confidence interval of the mean (Student's t); NaN of fewer than two values."""
     if len(values) < 2:
         return float("nan")
-    return float(t.ppf(0.975, len(values) - 1) * np.std(values, ddof=1) / np.sqrt(len(values)))
+    return float(stdtrit(len(values) - 1, 0.975) * np.std(values, ddof=1) / np.sqrt(len(values)))
 
 
 def summarise(testset: TestSet, methods: Sequence[Method], images: Sequence[ImageRow]) -> list[Row]:
