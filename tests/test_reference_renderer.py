@@ -207,6 +207,16 @@ def test_the_rasteriser_agrees_with_the_path_tracer(lights: tuple[str, ...], wid
     assert 0.95 < found.ratio[2] < 1.05
 
 
+def glossy_floor(light: Light, family: str, roughness: float, **layers: float) -> Scene:
+    """A floor of one material, seen askew in a black room."""
+    mean = float(bake_material(family, 0, 64).roughness.mean())
+    floor = Material(family, 0, ((0.5, 0.5, 0.5),) * 3, 1.0, 0.0, roughness / mean, 0.0, **layers)
+    black = Material("paint", 0, ((0.0, 0.0, 0.0),) * 3, 1.0, 0.0, 10.0, 0.0)
+    walls = Background("room", (6.0, 6.0, 4.0), dict.fromkeys(WALLS, black) | {"floor": floor})
+    camera = Camera((0.0, -1.0, 0.6), (0.0, 0.2, 0.0), (0.0, 0.0, 1.0), 50.0, 48, 32)
+    return replace(empty_room(light, camera=camera), background=walls)
+
+
 @pytest.mark.parametrize(("family", "roughness"), [("paint", 0.3), ("paint", 0.8), ("anodised_metal", 0.3)])
 def test_an_area_light_shines_as_in_the_path_tracer(family: str, roughness: float):
     """Diffuse and glossy light of a rectangle within 5 % in the median, also where it is brightest.
@@ -214,12 +224,7 @@ def test_an_area_light_shines_as_in_the_path_tracer(family: str, roughness: floa
     Rough metals are left out: the rasteriser gives back what one bounce between microfacets loses.
     """
     light = Light("area", (0.0, 0.9, 0.8), (0.0, -0.8, -0.6), (6.0, 6.0, 6.0), 0.0, 360.0, (0.8, 0.5))
-    camera = Camera((0.0, -1.0, 0.6), (0.0, 0.2, 0.0), (0.0, 0.0, 1.0), 50.0, 48, 32)
-    mean = float(bake_material(family, 0, 64).roughness.mean())
-    floor = Material(family, 0, ((0.5, 0.5, 0.5),) * 3, 1.0, 0.0, roughness / mean, 0.0)
-    black = Material("paint", 0, ((0.0, 0.0, 0.0),) * 3, 1.0, 0.0, 10.0, 0.0)
-    walls = Background("room", (6.0, 6.0, 4.0), dict.fromkeys(WALLS, black) | {"floor": floor})
-    scene = replace(empty_room(light, camera=camera), background=walls)
+    scene = glossy_floor(light, family, roughness)
     traced = renderer(256).render(scene)
     with Renderer(texture_size=64) as raster:
         drawn = raster.render(scene)
@@ -228,3 +233,15 @@ def test_an_area_light_shines_as_in_the_path_tracer(family: str, roughness: floa
     bright = b > np.quantile(b, 0.8)
     assert np.median(a[b > 0.02 * b.max()] / b[b > 0.02 * b.max()]) == pytest.approx(1.0, abs=0.05)
     assert np.median(a[bright] / b[bright]) == pytest.approx(1.0, abs=0.08)
+
+
+@pytest.mark.parametrize("layers", [{"sheen": 1.0}, {"clearcoat": 1.0, "clearcoat_roughness": 0.2}])
+def test_layers_return_as_much_light_as_in_the_path_tracer(layers: dict[str, float]):
+    """The floor as a whole within 10 %: the lobes are of other shapes there (docs/results.md)."""
+    light = Light("point", (0.0, 0.6, 0.9), (0.0, 0.0, -1.0), (3.0, 3.0, 3.0), 0.0, 360.0)
+    scene = glossy_floor(light, "paint", 0.9, **layers)
+    traced = renderer(16).render(scene)
+    with Renderer(texture_size=64) as raster:
+        drawn = raster.render(scene)
+    shown = (drawn.albedo.mean(-1) > 0.2) & (drawn.depth < 4)
+    assert drawn.radiance[shown].sum() / traced.radiance[shown].sum() == pytest.approx(1.0, abs=0.1)
