@@ -24,11 +24,11 @@ MODELS = {"brown-conrady": (1, 5), "fisheye": (2, 4)}
 """Distortion model -> its number in shaders/lens.glsl and how many coefficients it has."""
 
 _STRAIGHT = 3
-_MAX_SOFTNESS_PX = 50.0
 """LENS of shaders/lens.glsl that looks a pinhole image up in a larger one."""
 
 _WIDEST_TANGENT = 6.0
 _MOST_PIXELS = 3.0
+_MAX_SOFTNESS_PX = 50.0
 
 
 @dataclass(frozen=True)
