@@ -16,8 +16,10 @@ import numpy as np
 PALETTES = ("natural", "harmonised", "lab", "grey")
 """natural: muted, mostly earth, leaf and sky hues. harmonised: one hue per scene. lab: anything in gamut."""
 
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+"""Y of linear sRGB."""
+
 _XYZ_TO_RGB = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 _WHITE = np.array([0.9505, 1.0, 1.089])
 _DESATURATED = np.array([(1.0, keep, keep) for keep in (1.0, 0.8, 0.6, 0.4, 0.2, 0.0)])
 _NATURAL_HUES_DEG = (62.0, 80.0, 108.0, 138.0, 262.0, 35.0, 15.0, 320.0)
@@ -76,7 +78,7 @@ def blackbody_rgb(temperature_k: float) -> np.ndarray:
     z = 1.217 * lobe(437.0, 0.0845, 0.0278) + 0.681 * lobe(459.0, 0.0385, 0.0725)
     xyz = np.array([(radiance * curve).sum() for curve in (x, y, z)])
     rgb = np.clip(_XYZ_TO_RGB @ (xyz / xyz[1]), 0.0, None)
-    return rgb / (rgb @ _LUMINANCE)
+    return rgb / (rgb @ LUMINANCE)
 
 
 def lab_rand(rng: np.random.Generator, palette: str, mood: Mood) -> np.ndarray:
@@ -117,7 +119,7 @@ def calmed(colours: np.ndarray, variation: float) -> np.ndarray:
     colours: (N, 3) linear sRGB. Their luminance stays: in most real surfaces light and dark vary far more
     than colour does (docs/results.md). No channel leaves the range of `colours`.
     """
-    light = colours @ _LUMINANCE
+    light = colours @ LUMINANCE
     common = light[:, None] * (colours.mean(axis=0) / max(float(light.mean()), 1e-6))
     return np.clip(common + variation * (colours - common), colours.min(), colours.max())
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fsid.scene.choice import log_uniform_rand
-from fsid.scene.colour import blackbody_rgb
+from fsid.scene.colour import LUMINANCE, blackbody_rgb
 from fsid.scene.config import LightConfig
 from fsid.scene.model import Light, Sky, Vec3
 from fsid.scene.surroundings import Space
@@ -25,7 +25,6 @@ KINDS = ("point", "spot", "area")
 """The order of `LightConfig.kind_shares`."""
 
 SUN_TANGENT = 0.0047
-_LUMINANCE = np.array((0.2126, 0.7152, 0.0722))
 _LEAST_PRIMARY = 0.05
 """Candle light has no blue within sRGB: this much is left, for the camera to amplify."""
 _VIEW_DEG = 55.0
@@ -62,11 +61,11 @@ def lighting_rand(
     ]
     if sky_source is None:
         mean = np.sum([_irradiance(lamp, focus_m) for lamp in lamps], axis=0)
-        return _adapted(lamps, ambient * mean / (mean @ _LUMINANCE), None, focus_m, adaptation)
+        return _adapted(lamps, ambient * mean / (mean @ LUMINANCE), None, focus_m, adaptation)
     night = rng.random() < config.night_share
     sun, sky = _daylight_rand(rng, config, irradiance, sky_source)
     if night:
-        sky = replace(sky, colour=vec3(np.array(sky.colour) * (0.3 * ambient / (sky.colour @ _LUMINANCE))))
+        sky = replace(sky, colour=vec3(np.array(sky.colour) * (0.3 * ambient / (sky.colour @ LUMINANCE))))
     lights = lamps if night else sun
     return _adapted(lights, np.array(sky.colour), sky, focus_m, adaptation)
 
@@ -138,7 +137,7 @@ def _lamp_colour_rand(rng: np.random.Generator, config: LightConfig) -> np.ndarr
     if tinted:
         rgb = rgb * tint
     rgb = np.maximum(rgb, _LEAST_PRIMARY * rgb.max())
-    return rgb / (rgb @ _LUMINANCE)
+    return rgb / (rgb @ LUMINANCE)
 
 
 def _temperature_rand(rng: np.random.Generator, limits_k: tuple[float, float]) -> float:
@@ -187,8 +186,8 @@ def _adapted(
 ) -> Lighting:
     """The lighting with its mean colour moved towards white, at the same mean luminance."""
     mean = np.pi * ambient + sum((_irradiance(light, focus_m) for light in lights), np.zeros(3))
-    gains = (mean / (mean @ _LUMINANCE)) ** -adaptation
-    gains *= (mean @ _LUMINANCE) / (mean * gains @ _LUMINANCE)
+    gains = (mean / (mean @ LUMINANCE)) ** -adaptation
+    gains *= (mean @ LUMINANCE) / (mean * gains @ LUMINANCE)
     return Lighting(
         lights=tuple(replace(light, colour=vec3(light.colour * gains)) for light in lights),
         ambient=vec3(ambient * gains),
