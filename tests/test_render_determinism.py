@@ -15,7 +15,7 @@ import pytest
 from fsid.assets import MATERIAL_VARIANTS, material_families
 from fsid.errors import FsidError
 from fsid.render import Frame, Renderer
-from fsid.render.layers import LayerStore, fitting_size
+from fsid.render.layers import MOST_LAYERS, LayerStore, fitting_size
 from fsid.render.texels import bake_texels, level_ranges
 from fsid.render.texture_array import TextureArray, gl
 from fsid.scene import LightConfig, Scene, SceneConfig, sample
@@ -166,6 +166,51 @@ def test_memory_does_not_grow() -> None:
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     before, after = map(int, run.stdout.split()[-2:])
     assert after - before < 12 * (240 * 160 * 3 * 4) / 4
+
+
+CODE = """
+import sys
+sys.path[:0] = {path!r}
+from fsid.render import Renderer
+from render_scenes import bake_plain, block, lambertian, point_light, view
+
+def code_kib():
+    rows = open("/proc/self/smaps").read().splitlines()
+    total, counts = 0, False
+    for row in rows:
+        if "-" in row.split()[0]:
+            counts = len(row.split()) == 5 and "x" in row.split()[1]
+        total += int(row.split()[1]) if counts and row.startswith("Rss:") else 0
+    return total
+
+with Renderer(texture_size=64) as renderer:
+    for lights, things in ((3, 2), (7, 2), (1, 1), (2, 3), (4, 7), (8, 15)):
+        lamps = tuple(point_light((i / 10, 0.0, 1.0)) for i in range(lights))
+        boxes = [lambertian(block((0.1, 0.1, 0.1)))] * things
+        renderer.draw(view(*boxes, lights=lamps), bake=bake_plain)
+        print(code_kib())
+    print(renderer.info.is_software)
+"""
+"""KiB of memory that is code and comes from no file: what the driver has compiled."""
+
+
+def test_no_number_of_lights_or_things_is_compiled_for() -> None:
+    """llvmpipe compiles again where a side of a texture becomes a power of two; in a process of its own."""
+    code = CODE.format(path=sys.path)
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    *sizes, is_software = run.stdout.split()
+    if is_software == "False":
+        pytest.skip("what a GPU's driver compiles is not seen")
+    assert int(sizes[0]) > 0
+    assert len(set(sizes)) == 1
+
+
+def test_small_layers_are_bounded_by_number(renderer: Renderer) -> None:
+    store = LayerStore(renderer._context, 64)
+    texels = bake_texels("paint", 0, 64)
+    for i in range(MOST_LAYERS + 40):
+        store.load([(str(i), 0)], lambda *_: texels)
+    assert [array.capacity for array in store._arrays] == [MOST_LAYERS] * 2
 
 
 def test_samples_per_pixel_agree_on_average(renderer: Renderer) -> None:

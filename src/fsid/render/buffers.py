@@ -69,6 +69,9 @@ class Buffers:
             item.release()
 
     def _table(self, texels: np.ndarray) -> moderngl.Texture:
+        """Rows are added to an odd number, from three on: no power of two, for the reason of `ShadowPlan`."""
+        rows = len(texels)
+        texels = np.pad(texels, ((0, max(3, rows | 1) - rows), (0, 0), (0, 0)))
         height, width, _ = texels.shape
         texture = self._context.texture((width, height), 4, texels.tobytes(), dtype="f4")
         texture.filter = (moderngl.NEAREST, moderngl.NEAREST)

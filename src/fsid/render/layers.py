@@ -15,6 +15,10 @@ from fsid.render.texture_array import TextureArray
 BUDGET_BYTES = 320 * 2**20
 """Texture memory: 30 layers of 1024 texels, four times as many of 512."""
 
+MOST_LAYERS = 480
+"""Resident at most, however small they are: as many as the budget holds of 256 texels, those of five crowded
+scenes. 95 % of what later scenes need is among them; of four times as many it was 97 % (docs/results.md)."""
+
 _SMALLEST = 64
 
 _STEP_LAYERS = 16
@@ -49,7 +53,7 @@ class LayerStore:
     def __init__(self, context: moderngl.Context, size: int, budget_bytes: int = BUDGET_BYTES) -> None:
         self._context = context
         self._size = size
-        self._budget_layers = max(1, budget_bytes // _layer_bytes(size))
+        self._budget_layers = min(MOST_LAYERS, max(1, budget_bytes // _layer_bytes(size)))
         self._resident: OrderedDict[Hashable, Layer] = OrderedDict()
         self._arrays: list[TextureArray] = []
         self._capacity = 0

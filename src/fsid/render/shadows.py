@@ -73,7 +73,11 @@ class Tile:
 
 @dataclass(frozen=True)
 class ShadowPlan:
-    """The tiles of all lights in an atlas of `size` texels, `tile_px` a side each; and the lights' table."""
+    """The tiles of all lights in an atlas of `size` texels, `tile_px` a side each; and the lights' table.
+
+    No side of the atlas is a power of two: Mesa compiles every program once for textures with such sides and
+    once for those without, per texture and side, and keeps them all (0.25 MiB each).
+    """
 
     tiles: list[Tile]
     size: tuple[int, int]
@@ -112,8 +116,13 @@ def plan_shadows(
             focal = 1.0 / (f.half + border)
             tiles.append(Tile(f.origin, f.axes, focal, (x * tile_px, y * tile_px), f.range_m, source.lamp))
         _fill(row, source.light, border, first, tiles[first:])
-    size = (max(1, min(count, COLUMNS)) * tile_px, max(1, -(-count // COLUMNS)) * tile_px)
+    size = (_side_px(min(count, COLUMNS), tile_px), _side_px(-(-count // COLUMNS), tile_px))
     return ShadowPlan(tiles, size, tile_px, len(sources), table)
+
+
+def _side_px(tiles: int, tile_px: int) -> int:
+    """Half a tile more than a power of two: all mip levels that shadows read stay aligned with the tiles."""
+    return max(1, tiles) * tile_px + (tile_px // 2 if tiles.bit_count() <= 1 else 0)
 
 
 def half_axes(light: Light) -> tuple[np.ndarray, np.ndarray]:
