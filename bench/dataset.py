@@ -2,13 +2,16 @@
 
 All ratios are of one run. "cpu" is processor time of all threads of the process, which stays true on a busy
 machine. Parts: stages (cost of a pair), workers (two against one), memory (per scene), growth (time over
-pixels and triangles), loader (patches per second). The memory of 1,000 scenes: --only memory --scenes 1000.
+pixels and triangles), loader (patches per second). Memory is of 128x72 and 3 to 5 objects, with --width of
+default scenes: --only memory --scenes 1000, --only memory --scenes 8 --width 1920.
 """
 
 from __future__ import annotations
 
 import argparse
+import ctypes
 import os
+import resource
 import tempfile
 import time
 from collections.abc import Callable
@@ -115,20 +118,34 @@ def pairs_per_second(config: GenerateConfig, pairs: int, count: int) -> float:
     return (after - before) / (end - start)
 
 
+class Mallinfo2(ctypes.Structure):
+    """glibc's statistics of malloc; hblkhd: bytes in blocks that are mapped one by one."""
+
+    _fields_ = (("first", ctypes.c_size_t * 4), ("hblkhd", ctypes.c_size_t), ("last", ctypes.c_size_t * 5))
+
+
 def memory(config: GenerateConfig, scenes: int) -> None:
-    """Resident memory of one worker over scenes: a line through the second half."""
-    resident = []
+    """Resident memory of one worker over scenes, with a line through the second half; and without the blocks
+    above a MiB: images, whose size is that of the last scenes' lights, and up to 80 MiB of materials."""
+    mallinfo2 = ctypes.CDLL(None).mallinfo2
+    mallinfo2.restype = Mallinfo2
+    held, every = np.zeros((scenes, 2)), max(1, scenes // 20)
     with Renderer(supersampling=config.supersampling, texture_size=config.texture_px) as renderer:
         for i in range(scenes):
             make(config, i, renderer)
-            pages = int(Path("/proc/self/statm").read_text().split()[1])
-            resident.append(pages * os.sysconf("SC_PAGE_SIZE") / 2**20)
-    half = resident[scenes // 2 :]
-    slope = np.polyfit(np.arange(len(half)), half, 1)[0]
-    print(
-        f"memory: {half[0]:.0f} to {half[-1]:.0f} MiB over the last {len(half)} of {scenes} scenes, ", end=""
-    )
-    print(f"{slope:+.3f} MiB per scene")
+            resident = int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
+            held[i] = np.array([resident, resident - mallinfo2().hblkhd]) / 2**20
+            if (i + 1) % every == 0:
+                peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+                mean, small = held[i + 1 - every : i + 1].mean(0)
+                line = f"  to scene {i + 1}: {mean:.0f} MiB, {small:.0f} in small blocks, peak {peak:.0f}"
+                print(line, flush=True)
+    half = held[scenes // 2 :]
+    for name, column in zip(("memory", "in small blocks"), half.T, strict=True):
+        (slope, _), covariance = np.polyfit(np.arange(len(half)), column, 1, cov=True)
+        print(
+            f"{name}: {slope:+.3f} +- {covariance[0, 0] ** 0.5:.3f} MiB per scene over the last {len(half)}"
+        )
 
 
 def growth(config: GenerateConfig) -> None:
@@ -221,17 +238,18 @@ def write_noise(folder: Path) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--pairs", type=int, default=3, help="pairs per measurement")
-    parser.add_argument("--scenes", type=int, default=300, help="scenes of the memory measurement")
-    parser.add_argument("--width", type=int, default=1920, help="of a frame, pixels; 16:9")
+    parser.add_argument("--scenes", type=int, default=300, help="scenes of memory")
+    parser.add_argument("--width", type=int, help="of a frame, pixels; 16:9. 1920, of memory 128")
     parser.add_argument("--only", choices=SECTIONS, help="one part")
     options = parser.parse_args()
-    config = GenerateConfig(width=options.width, height=options.width * 9 // 32 * 2)
+    width = options.width or 1920
+    config = GenerateConfig(width=width, height=width * 9 // 32 * 2)
     small = GenerateConfig(width=320, height=180, scene=SceneConfig(objects=(10, 20)))
     tiny = GenerateConfig(width=128, height=72, scene=SceneConfig(objects=(3, 5)))
     sections: dict[str, Callable[[], object]] = {
         "stages": lambda: print(f"pair of {config.width}x{config.height}: {stages(config, options.pairs)}"),
         "workers": lambda: workers(small, 2 * options.pairs),
-        "memory": lambda: memory(tiny, options.scenes),
+        "memory": lambda: memory(config if options.width else tiny, options.scenes),
         "growth": lambda: growth(config),
         "loader": loader,
     }

@@ -7,21 +7,16 @@ stays true on a busy machine, and its half is what two free cores would take.
 
 --fidelity compares both qualities with 4 x 4 samples per pixel (PSNR of the radiance, scaled so that its
 97th percentile is white, at 480x270). --triangles draws one scene with meshes divided into ever more
-triangles. --memory draws one default scene after the other, as a worker does, and prints what the process
-holds and has held at most, twenty times on the way; and how that grows per scene over the second half, freed
-blocks given back before each look: --memory --frames 1000 --width 240.
+triangles. Memory over many scenes: bench/dataset.py --only memory.
 """
 
 from __future__ import annotations
 
 import argparse
-import ctypes
-import gc
 import resource
 import time
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -43,15 +38,12 @@ def main() -> None:
     parser.add_argument("--quality", default="high", help="high or fast")
     parser.add_argument("--fidelity", action="store_true", help="compare the qualities instead")
     parser.add_argument("--triangles", action="store_true", help="cost over triangles instead")
-    parser.add_argument("--memory", action="store_true", help="memory over consecutive scenes instead")
-    parser.add_argument("--width", type=int, default=1920, help="of the images of --memory, 16:9")
     options = parser.parse_args()
     if options.fidelity:
         return fidelity(options)
     with open_renderer(options, options.quality) as renderer:
         print(f"{renderer.info.renderer}, OpenGL {renderer.info.version}, quality {options.quality}")
-        measure = memory if options.memory else triangles if options.triangles else frames
-        measure(renderer, options)
+        (triangles if options.triangles else frames)(renderer, options)
     print(f"peak memory {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024:,.0f} MiB")
     return None
 
@@ -84,28 +76,6 @@ def frames(renderer: Renderer, options: argparse.Namespace) -> None:
     faces = sum(face_count(view) for view in views) / len(views)
     small, large = (t["cpu"] for t in totals)
     print(f"1920x1080 costs {large / small:.2f} x 960x540 for 4 x the pixels; {faces:,.0f} triangles a scene")
-
-
-def memory(renderer: Renderer, options: argparse.Namespace) -> None:
-    """What the process holds over `--frames` consecutive default scenes."""
-    every, held = max(1, options.frames // 20), []
-    for seed in range(options.frames):
-        renderer.render(sample(SceneConfig(), seed, width=options.width, height=options.width * 9 // 32 * 2))
-        held.append(held_mib())
-        if seed % every == every - 1:
-            peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-            print(f"scene {seed}: holds {held[-1]:,.0f} MiB, peak so far {peak:,.0f} MiB", flush=True)
-    later = held[len(held) // 2 :]
-    if len(later) > 1:
-        slope = np.polyfit(np.arange(len(later)), later, 1)[0]
-        print(f"{slope:+.3f} MiB per scene over the last {len(later)}, at most {max(later):,.0f} MiB")
-
-
-def held_mib() -> float:
-    """Memory of this process, without what malloc keeps for later."""
-    gc.collect()
-    ctypes.CDLL(None).malloc_trim(0)
-    return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize() / 2**20
 
 
 def triangles(renderer: Renderer, options: argparse.Namespace) -> None:

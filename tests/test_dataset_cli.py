@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import time
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from PIL import Image
 
 from fsid.cli.main import main
+from fsid.cli.progress import progress_bar
 from fsid.dataset import generate_config, shard_path
 from fsid.dataset.shards import read_samples
 
@@ -75,8 +77,27 @@ def test_a_dry_run_estimates_and_writes_nothing(data: Path, capsys: pytest.Captu
     text = capsys.readouterr().out
     assert "160 pairs in 10 shards" in text
     per_pair_mb = [float(mb) for mb in re.findall(r"([\d.e+-]+) MB per pair", text)]
+    assert re.search(r"time   0 h \d\d min with 2 workers \([\d.e-]+ s per pair\)", text)
     stored_mb = shard_path(data / "data", 0).stat().st_size / 5e6
     assert per_pair_mb == pytest.approx([stored_mb] * 2, rel=0.2)
+
+
+def test_progress_shows_rate_time_left_and_failures(capsys: pytest.CaptureFixture[str]) -> None:
+    with progress_bar("pairs", "pairs", quiet=False) as progress:
+        for done in (0, 2, 4):
+            progress(done, 8)
+            time.sleep(0.01)
+        for line in ("worker 1 died", "worker 0 died"):
+            progress.failed(line)
+        progress._bar.refresh()
+        task = progress._bar.tasks[0]
+        cells = [column(task) for column in progress._bar.columns]
+    shown = " ".join(getattr(cell, "plain", str(cell)) for cell in cells)
+    assert "4/8" in shown
+    assert "2 failures" in shown
+    assert re.search(r"\d pairs/s", shown)
+    assert re.search(r"\d:\d\d", shown)
+    assert "worker 1 died" in capsys.readouterr().err
 
 
 def test_a_count_is_needed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

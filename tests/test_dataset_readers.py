@@ -15,6 +15,7 @@ from fsid.config import load_settings
 from fsid.dataset import GenerateConfig, generate, shard_path
 from fsid.dataset.card import _sources, _Tally
 from fsid.dataset.inspect import inspect
+from fsid.dataset.shards import read_records
 from fsid.dataset.statistics import TITLES
 
 SETTINGS = ["width=64", "height=48", "texture_size=64", "supersampling=1", "scene.objects=[1,3]"]
@@ -104,6 +105,19 @@ def test_the_card_states_what_inspect_measures(tmp_path: Path, rng: np.random.Ge
     assert "Means over 2 of the clean images" in card
     for name, title in TITLES.items():
         assert f"| {title} | {measured[name].mean():.3g} |" in card
+
+
+def test_the_card_counts_what_the_checks_refused(tmp_path: Path, rng: np.random.Generator) -> None:
+    """Pictures of 32 pixels, most of them black: windows of them are drawn until one is not."""
+    pixels = np.zeros((32, 400, 3), np.uint8)
+    pixels[:, 300:] = rng.integers(40, 200, (32, 100, 3), np.uint8)
+    Image.fromarray(pixels).save(tmp_path / "mostly-black.png")
+    generate(tmp_path / "data", GenerateConfig(images=str(tmp_path), width=32, height=32), count=4, seed=3)
+    refused = [record["refused"] for record in read_records(shard_path(tmp_path / "data", 0))]
+    times = sum(map(len, refused))
+    assert times > 0
+    card = (tmp_path / "data" / "README.md").read_text()
+    assert f"| refused by the checks | {times} of {4 + times} frames: black ({times}) times |" in card
 
 
 def test_licences_of_meshes_are_counted_by_use(tmp_path: Path) -> None:
