@@ -22,6 +22,7 @@ import numpy as np
 
 from fsid.dataset import GenerateConfig, encode, generate
 from fsid.dataset.attempt import Attempt
+from fsid.dataset.crew import thread_limits
 from fsid.dataset.shards import write_shard
 from fsid.render import Frame, Renderer
 from fsid.scene import Scene
@@ -92,11 +93,11 @@ def make(
 
 def workers(config: GenerateConfig, pairs: int) -> None:
     """Two workers of one thread against one, and against one of two threads; their start is left out."""
-    teams = {"1 of 1 thread": (1, "1"), "1 of 2 threads": (1, "2"), "2 of 1 thread": (2, "1")}
+    teams = {"1 of 1 thread": (1, 1), "1 of 2 threads": (1, 2), "2 of 1 thread": (2, 1)}
     rates = dict.fromkeys(teams, 0.0)
     for _ in range(2):
         for name, (count, threads) in teams.items():
-            os.environ["LP_NUM_THREADS"] = os.environ["OMP_NUM_THREADS"] = threads
+            os.environ.update(thread_limits(threads))
             rates[name] = max(rates[name], pairs_per_second(config, pairs, count))
     best = rates.pop("2 of 1 thread")
     print(f"workers: 2 of 1 thread make {best:.2f} pairs/s")
@@ -125,10 +126,11 @@ class Mallinfo2(ctypes.Structure):
 
 
 def memory(config: GenerateConfig, scenes: int) -> None:
-    """Resident memory of one worker over scenes, with a line through the second half; and without the blocks
-    above a MiB: images, whose size is that of the last scenes' lights, and up to 80 MiB of materials."""
+    """Resident memory of a worker of one thread over scenes, with a line through the second half; and without
+    blocks above a MiB: images, whose size is that of the scene's lights, and up to 80 MiB of materials."""
     mallinfo2 = ctypes.CDLL(None).mallinfo2
     mallinfo2.restype = Mallinfo2
+    os.environ.update(thread_limits(1))
     held, every = np.zeros((scenes, 2)), max(1, scenes // 20)
     with Renderer(supersampling=config.supersampling, texture_size=config.texture_px) as renderer:
         for i in range(scenes):

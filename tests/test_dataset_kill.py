@@ -249,6 +249,20 @@ def make_pid(gpu: int | None):
     return lambda task: os.getpid()
 
 
+def make_environment(gpu: int | None):
+    return lambda variable: os.environ[variable]
+
+
+def test_as_many_workers_as_cores_render_each_in_its_own_thread(monkeypatch: pytest.MonkeyPatch) -> None:
+    names = ["LP_NUM_THREADS", "OMP_NUM_THREADS"]
+    for name in names:
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda pid: {0, 1, 2, 3})
+    for size, expected in ((4, ["0", "1"]), (2, ["2", "2"])):
+        found = dict(run(LocalCrew(size, make_environment), names, tasks_per_worker=9))
+        assert [found[name] for name in names] == expected
+
+
 def test_workers_share_gpus_as_configured() -> None:
     gpus = [
         result for _, result in run(LocalCrew(4, make_gpu, workers_per_gpu=2), [0.5] * 4, tasks_per_worker=9)

@@ -33,7 +33,7 @@ MakeWork = Callable[[int | None], Work]
 """Called once in every new worker with the index of its GPU (None: not assigned); does one task per call."""
 
 TRIES = 5
-_CPU_THREADS = ("LP_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+_NUMERIC_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 _PATIENCE_S = 10.0
 
 
@@ -149,6 +149,18 @@ def do_task(work: Work, task: Any) -> Any:
         return _Bug(traceback.format_exc())
 
 
+def thread_limits(threads: int) -> dict[str, str]:
+    """Environment variables that keep a worker to so many threads.
+
+    A worker of one thread rasterises in that thread (0 for Mesa's llvmpipe). With a thread beside it passes
+    queue up, and places of the queue that are seldom used hold the shadow maps of long past scenes.
+    """
+    return {
+        "LP_NUM_THREADS": str(threads if threads > 1 else 0),
+        **dict.fromkeys(_NUMERIC_THREADS, str(threads)),
+    }
+
+
 class LocalCrew:
     """Spawned processes, each behind a pipe of its own.
 
@@ -176,8 +188,8 @@ class LocalCrew:
         ours, theirs = self._context.Pipe()
         gpu = worker // self._workers_per_gpu if self._workers_per_gpu else None
         process = self._context.Process(target=_serve, args=(theirs, self._make_work, gpu), daemon=True)
-        threads = str(max(1, len(os.sched_getaffinity(0)) // self._size))
-        with _environment(dict.fromkeys(_CPU_THREADS, threads)):
+        threads = max(1, len(os.sched_getaffinity(0)) // self._size)
+        with _environment(thread_limits(threads)):
             process.start()
         theirs.close()
         self._members[worker] = process, ours

@@ -10,7 +10,7 @@ import logging
 import socket
 from typing import Any
 
-from fsid.dataset.crew import Lost, MakeWork, do_task
+from fsid.dataset.crew import Lost, MakeWork, do_task, thread_limits
 from fsid.errors import FsidError
 
 _PATIENCE_S = 5.0
@@ -53,7 +53,7 @@ class RayCrew:
             raise FsidError(f"--workers {size}: the Ray cluster has {cpus} CPUs, one per worker is needed")
         share = 1 / workers_per_gpu if workers_per_gpu else 0
         self._has_gpu = share > 0
-        threads = {"env_vars": {"LP_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}}
+        threads = {"env_vars": thread_limits(1)}
         self._actor = ray.remote(num_cpus=1, num_gpus=share, runtime_env=threads)(_Member)
         self._members: dict[int, Any] = {}
         self._pending: dict[Any, int] = {}
