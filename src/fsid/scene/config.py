@@ -45,7 +45,7 @@ class PlacementConfig:
 class MaterialConfig:
     """M: how baked families are coloured and finished."""
 
-    plain_share: float = knob(0.17, 0.0, 1.0)
+    plain_share: float = knob(0.14, 0.0, 1.0)
     """Share of surfaces in plain paint: homogeneous areas exist in reality too."""
     tile_scale: Range = knob((0.12, 1.2), 0.01, 100.0)
     """Texture tile width on objects relative to the natural width of its family; log-uniform."""
@@ -61,8 +61,8 @@ class MaterialConfig:
     """How far the colours of one material may lie apart: 1 as drawn, 0 all alike."""
     natural_share: float = knob(0.4, 0.0, 1.0)
     """Share of materials in the colours that their family has in nature, where it has some."""
-    calm_share: float = knob(0.6, 0.0, 1.0)
-    """Share of scenes whose textures vary in light and dark more than in colour, as most real ones do."""
+    calm_share: float = knob(0.2, 0.0, 1.0)
+    """Share of scenes whose textures vary in light and dark more than in colour."""
     variation: Range = knob((0.15, 0.8), 0.0, 1.0)
     """How much of the colour differences within one material is left in those scenes."""
     layer_share: float = knob(0.03, 0.0, 1.0)
@@ -94,7 +94,7 @@ class BackgroundConfig:
     """Height of the hills towards the horizon."""
     pool_share: float = knob(0.7, 0.0, 1.0)
     """Share of surfaces whose material comes from the pool of their sort (`fsid.scene.pools`)."""
-    plain_share: float = knob(0.3, 0.0, 1.0)
+    plain_share: float = knob(0.25, 0.0, 1.0)
     """Share of walls, ceilings and backdrops in plain paint."""
     tile_scale: Range = knob((0.25, 1.6), 0.01, 100.0)
     """Texture tile width on backgrounds relative to the natural width of its family; log-uniform."""

@@ -4,7 +4,7 @@
 
 A camera meters the scene to a mid-grey and backs off for highlights, and neither exactly. So `key` is
 log-uniform over 0.05 to 0.5 (an 18 % card, from 1.5 stops over to two under) and the share of pixels that
-may reach saturation is log-uniform over 0.2 % to 40 %: a white sky or snow burns out in one photograph in
+may reach saturation is log-uniform over 0.005 % to 25 %: a white sky or snow burns out in one photograph in
 twenty, and a denoiser that never saw it loses most there (docs/results.md).
 Low light needs no darker image: the camera answers it with ISO, and ISO sets the noise.
 """
@@ -17,7 +17,7 @@ from fsid.errors import FsidError
 from fsid.sensor.colour import SRGB_TO_XYZ
 
 KEY_RANGE = (0.05, 0.5)
-CLIPPED_PERCENT_RANGE = (0.2, 40.0)
+CLIPPED_PERCENT_RANGE = (0.005, 25.0)
 
 
 def exposure_rand(rng: np.random.Generator, radiance: np.ndarray) -> float:
