@@ -1,9 +1,11 @@
 """Pictures in, statistics out: a dataset of this package, or any folder of photographs, seen alike.
 
-    dataset: clean mosaic -> R, (Gr + Gb) / 2, B at half resolution -> white balance, CCM -> sRGB curve
-    photo:   inverse tone curve -> every second row and column of each channel -> sRGB curve
+    photo -> clean mosaic of PHOTO_CAMERA, as in training
+    clean mosaic -> R, (Gr + Gb) / 2, B at half resolution -> white balance, CCM -> sRGB curve
 
-Both are the light on the sensor, without interpolation. See `statistics` for what is measured.
+Nothing is interpolated. Photographs take the way through a camera, too, because it leaves traces: colours are
+sampled beside each other and then mixed by a matrix, which turns fine detail into colour. Compared with
+photographs as they are, any RAW has too much colour in its texture. See `statistics` for what is measured.
 """
 
 from __future__ import annotations
@@ -14,6 +16,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from fsid.dataset.index import StoredMosaic, index_mosaics
 from fsid.dataset.photos import find_photos, read_photo
@@ -21,11 +24,11 @@ from fsid.dataset.shards import read_member
 from fsid.dataset.statistics import Comparison, compare, measure, pool
 from fsid.errors import FsidError
 from fsid.files import write_atomically
-from fsid.sensor import camera_to_srgb_matrix, pack, srgb_encode
-from fsid.sensor.tone import photo_to_linear
+from fsid.sensor import camera_to_srgb_matrix, clean_from_photo, load_profile, pack, srgb_encode
 
 MAX_PICTURES = 400
 """Of a larger set, this many pictures are measured, evenly spaced."""
+PHOTO_CAMERA = "pixel6"
 
 Progress = Callable[[int, int], None]
 
@@ -121,13 +124,19 @@ def _stored_picture(stored: StoredMosaic) -> np.ndarray:
         stored.shard, "<u2", mode="r", offset=stored.offset, shape=(stored.height, stored.width)
     )
     mosaic = (levels.astype(np.float32) - stored.black_level) / (stored.white_level - stored.black_level)
-    red, green_r, green_b, blue = pack(mosaic, stored.cfa)
-    gains = np.array(record["white_balance"], np.float32) / min(record["white_balance"])
-    balanced = np.minimum(np.stack([red, (green_r + green_b) / 2, blue], axis=-1) * gains, 1)
-    return srgb_encode(balanced @ camera_to_srgb_matrix(np.array(record["xyz_to_camera"])).T)
+    return _picture(mosaic, stored.cfa, record["white_balance"], record["xyz_to_camera"])
 
 
 def _photo_picture(path: Path) -> np.ndarray:
-    linear = photo_to_linear(read_photo(path))
-    red, green, blue = linear[::2, ::2, 0], linear[..., 1], linear[1::2, 1::2, 2]
-    return srgb_encode(np.stack([red, (green[::2, 1::2] + green[1::2, ::2]) / 2, blue], axis=-1))
+    """Colour and exposure are drawn anew for each photograph, by its name: the same in every run."""
+    rng = np.random.default_rng(list(path.name.encode()))
+    raw = clean_from_photo(rng, read_photo(path), load_profile(PHOTO_CAMERA))
+    return _picture(raw.mosaic, raw.cfa, raw.white_balance, raw.xyz_to_camera)
+
+
+def _picture(mosaic: np.ndarray, cfa: str, white_balance: ArrayLike, xyz_to_camera: ArrayLike) -> np.ndarray:
+    """(H / 2, W / 2, 3) sRGB-encoded of a mosaic (H, W) in 0..1."""
+    red, green_r, green_b, blue = pack(mosaic, cfa)
+    gains = np.asarray(white_balance, np.float32) / np.min(white_balance)
+    balanced = np.minimum(np.stack([red, (green_r + green_b) / 2, blue], axis=-1) * gains, 1)
+    return srgb_encode(balanced @ camera_to_srgb_matrix(np.asarray(xyz_to_camera)).T)
