@@ -2,8 +2,8 @@
 
 All ratios are of one run. "cpu" is processor time of all threads of the process, which stays true on a busy
 machine. Parts: stages (cost of a pair), workers (two against one), memory (per scene), growth (time over
-pixels and triangles), loader (patches per second). Memory is of 128x72 and 3 to 5 objects, with --width of
-default scenes: --only memory --scenes 1000, --only memory --scenes 8 --width 1920.
+pixels and triangles), loader (patches per second). Memory is of 128x72, 3 to 5 objects and fast quality, with
+--width of default scenes in high quality: --only memory --scenes 1000, --only memory --scenes 8 --width 1920.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from fsid.dataset import GenerateConfig, encode, generate
 from fsid.dataset.attempt import Attempt
 from fsid.dataset.crew import thread_limits
 from fsid.dataset.shards import write_shard
+from fsid.dataset.worker import rendering
 from fsid.render import Frame, Renderer
 from fsid.scene import Scene
 from fsid.scene.config import SceneConfig
@@ -132,7 +133,7 @@ def memory(config: GenerateConfig, scenes: int) -> None:
     mallinfo2.restype = Mallinfo2
     os.environ.update(thread_limits(1))
     held, every = np.zeros((scenes, 2)), max(1, scenes // 20)
-    with Renderer(supersampling=config.supersampling, texture_size=config.texture_px) as renderer:
+    with rendering(config) as renderer:
         for i in range(scenes):
             make(config, i, renderer)
             resident = int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
@@ -247,7 +248,7 @@ def main() -> None:
     width = options.width or 1920
     config = GenerateConfig(width=width, height=width * 9 // 32 * 2)
     small = GenerateConfig(width=320, height=180, scene=SceneConfig(objects=(10, 20)))
-    tiny = GenerateConfig(width=128, height=72, scene=SceneConfig(objects=(3, 5)))
+    tiny = GenerateConfig(width=128, height=72, quality="fast", scene=SceneConfig(objects=(3, 5)))
     sections: dict[str, Callable[[], object]] = {
         "stages": lambda: print(f"pair of {config.width}x{config.height}: {stages(config, options.pairs)}"),
         "workers": lambda: workers(small, 2 * options.pairs),
