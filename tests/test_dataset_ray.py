@@ -58,7 +58,7 @@ def test_lost_actors_change_nothing(tmp_path: Path) -> None:
     killed: list[int] = []
     lines: list[str] = []
     over = threading.Event()
-    killer = threading.Thread(target=kill_two, args=(out, killed, over))
+    killer = threading.Thread(target=kill_two, args=(out, killed, over), daemon=True)
     killer.start()
     force = Workforce(workers=2, ray="local")
     assert generate(out, config, count=48, shard_size=4, workforce=force, lost=lines.append) == 48
