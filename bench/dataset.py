@@ -144,6 +144,8 @@ def memory(config: GenerateConfig, scenes: int) -> None:
                 line = f"  to scene {i + 1}: {mean:.0f} MiB, {small:.0f} in small blocks, peak {peak:.0f}"
                 print(line, flush=True)
     half = held[scenes // 2 :]
+    if len(half) < 3:
+        return  # no line is certain
     for name, column in zip(("memory", "in small blocks"), half.T, strict=True):
         (slope, _), covariance = np.polyfit(np.arange(len(half)), column, 1, cov=True)
         print(
