@@ -9,6 +9,7 @@ from natural palettes, some carry a gradient, and the picture is drawn at twice 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -41,11 +42,20 @@ def dead_leaves_rand(rng: np.random.Generator, height: int, width: int) -> np.nd
     return picture.reshape(height, n, width, n, 3).mean((1, 3)).clip(0, 1)
 
 
-def write_dead_leaves(folder: Path, count: int, *, height: int, width: int, seed: int) -> None:
+def write_dead_leaves(
+    folder: Path,
+    count: int,
+    *,
+    height: int,
+    width: int,
+    seed: int,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> None:
     """Pictures 0 .. count-1 as PNG files; those that are there already are kept."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for i in range(count):
+            progress(i, count)
             path = folder / f"{i:06d}.png"
             if path.exists():
                 continue
@@ -53,6 +63,7 @@ def write_dead_leaves(folder: Path, count: int, *, height: int, width: int, seed
             part = path.with_suffix(".part")
             Image.fromarray(to_uint8(dead_leaves_rand(rng, height, width))).save(part, format="PNG")
             part.replace(path)
+        progress(count, count)
     except OSError as error:
         raise FsidError(f"{folder}: cannot be written ({error.strerror})") from None
 
