@@ -1,4 +1,4 @@
-"""A lens's point spread: a Gaussian of the stated width that neither makes nor loses light; sharpening."""
+"""A lens's point spread: a Gaussian of the stated width that neither makes nor loses light."""
 
 from dataclasses import replace
 
@@ -7,7 +7,7 @@ import pytest
 
 from fsid.errors import FsidError
 from fsid.render.camera import lens_of
-from fsid.render.softness import focused, sharpen, soften
+from fsid.render.softness import soften
 from fsid.scene.model import Camera
 
 CAMERA = Camera((0, 1, 1), (0, 0, 0), (0, 1, 0), 60.0, 64, 64)
@@ -40,33 +40,3 @@ def test_no_softness_changes_nothing():
 def test_a_senseless_softness_is_refused(softness_px):
     with pytest.raises(FsidError, match="softness_px"):
         lens_of(replace(CAMERA, softness_px=softness_px))
-
-
-def test_sharpening_adds_the_stated_share_of_fine_detail():
-    """A sine of frequency f keeps exp(-2 (pi f sigma)^2) behind a Gaussian; the rest is what is added."""
-    frequency, amount = 0.2, 0.7
-    wave = 1 + 0.1 * np.sin(2 * np.pi * frequency * np.arange(200, dtype=np.float32))
-    image = np.tile(wave[:, None, None], (1, 8, 3)).astype(np.float32)
-    gain = (sharpen(image, amount)[50:150] - 1).std() / (image[50:150] - 1).std()
-    assert gain == pytest.approx(1 + amount * (1 - np.exp(-2 * (np.pi * frequency * 1.2) ** 2)), rel=0.01)
-
-
-def test_sharpening_leaves_no_black_ring_around_a_lamp():
-    image = np.full((32, 32, 3), 0.5, np.float32)
-    image[16, 16] = 500.0
-    sharp = sharpen(image, 1.0)
-    assert sharp.dtype == np.float32
-    assert sharp.min() >= 0.5 / 1.61
-    assert sharp.max() <= 500.0 * 1.61
-
-
-def test_a_camera_softens_and_sharpens_its_own_images():
-    image = np.random.default_rng(1).random((20, 20, 3), np.float32)
-    assert focused(image, CAMERA) is image
-    both = focused(image, replace(CAMERA, softness_px=0.8, sharpening=0.5))
-    np.testing.assert_array_equal(both, sharpen(soften(image, 0.8), 0.5))
-
-
-def test_a_senseless_sharpening_is_refused():
-    with pytest.raises(FsidError, match="sharpening"):
-        lens_of(replace(CAMERA, sharpening=-0.1))

@@ -34,7 +34,7 @@ from fsid.render.quality import QUALITIES, tap_table
 from fsid.render.sample_pass import SamplePass
 from fsid.render.shade_pass import ShadePass
 from fsid.render.shadow_pass import ShadowPass
-from fsid.render.softness import focused
+from fsid.render.softness import soften
 from fsid.render.stage import Stage, stage_of
 from fsid.render.targets import Targets
 from fsid.render.texels import Bake, bake_texels
@@ -170,13 +170,13 @@ class Renderer:
         mark("readback")
         shots = shots_of(camera, view.drawables, frame, shot, self._label_sample, self._quality.shots)
         if not shots:
-            return replace(frame, radiance=focused(frame.radiance, camera))
+            return replace(frame, radiance=soften(frame.radiance, camera.softness_px))
         total = np.zeros_like(frame.radiance)
         for part in shots:
             self._draw(view, part, bake, mark)
             total += self._targets.read_radiance()[..., :3]
         mean = total / np.float32(len(shots))
-        return replace(frame, radiance=focused(mean, camera))
+        return replace(frame, radiance=soften(mean, camera.softness_px))
 
     def wait(self) -> None:
         """Return when everything issued so far is done; only measuring needs it."""

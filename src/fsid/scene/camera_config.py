@@ -95,10 +95,6 @@ class LensConfig:
     """Share whose lens is softer than the pixel grid; the rest is as sharp as its pixels."""
     softness_px: Range = knob((0.2, 0.9), 0.0, 20.0)
     """Standard deviation of the lens's point spread, pixels of the image."""
-    sharp_share: float = knob(0.5, 0.0, 1.0)
-    """Share that is sharpened, as published photographs are."""
-    sharpening: Range = knob((0.2, 1.0), 0.0, 5.0)
-    """How much of the detail finer than 1.2 pixels is added once more."""
 
     def __post_init__(self) -> None:
         check_knobs(self)

@@ -47,7 +47,6 @@ def lens_rand(rng: np.random.Generator, config: LensConfig, camera: Camera) -> C
     loss, power = rng.uniform(*config.vignetting), rng.dirichlet((2.0, 1.0, 0.5))
     fringe = rng.uniform(*config.fringe, 2)
     softness_px = float(rng.uniform(*config.softness_px))
-    sharp, sharpening = rng.random() < config.sharp_share, float(rng.uniform(*config.sharpening))
     if fisheye:
         camera = _fisheye(camera, bend)
     elif distorted:
@@ -60,9 +59,7 @@ def lens_rand(rng: np.random.Generator, config: LensConfig, camera: Camera) -> C
         camera = replace(camera, vignetting=(a1, a2, a3))
     if fringed:
         camera = replace(camera, chromatic_aberration=(float(fringe[0]), float(fringe[1])))
-    if soft:
-        camera = replace(camera, softness_px=softness_px)
-    return replace(camera, sharpening=sharpening) if sharp else camera
+    return replace(camera, softness_px=softness_px) if soft else camera
 
 
 def corner_radius(camera: Camera) -> float:

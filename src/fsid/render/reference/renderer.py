@@ -25,7 +25,7 @@ from fsid.render.reference.bodies import Body, body_of, bsdf_of, pyramids
 from fsid.render.reference.dicing import View
 from fsid.render.reference.lights import emitters, surroundings
 from fsid.render.reference.variant import load_mitsuba
-from fsid.render.softness import focused
+from fsid.render.softness import soften
 from fsid.scene.model import Camera, Scene
 
 _PASS = 16
@@ -85,7 +85,7 @@ class ReferenceRenderer:
                 prepared = self.prepare(scene, _later(camera, offset))
             total += prepared.radiance(-(-self._samples // steps), seed * steps + k)
         radiance = (total / steps * _vignette(camera)[..., None]).astype(np.float32)
-        return replace(labels, radiance=focused(radiance, camera))
+        return replace(labels, radiance=soften(radiance, camera.softness_px))
 
     def prepare(self, scene: Scene, camera: Camera) -> Prepared:
         """The scene in Mitsuba's memory, diced for a camera; apart from `render` for measuring its time."""
