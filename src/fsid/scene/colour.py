@@ -116,8 +116,7 @@ def albedo_rgb(lab: np.ndarray, low: float, high: float) -> np.ndarray:
 def calmed(colours: np.ndarray, variation: float) -> np.ndarray:
     """(N, 3) linear albedos that keep a share `variation` of their distance from their common chromaticity.
 
-    colours: (N, 3) linear sRGB. Their luminance stays: in most real surfaces light and dark vary far more
-    than colour does (docs/results.md). No channel leaves the range of `colours`.
+    colours: (N, 3) linear sRGB. Their luminance stays, and no channel leaves the range of `colours`.
     """
     light = colours @ LUMINANCE
     common = light[:, None] * (colours.mean(axis=0) / max(float(light.mean()), 1e-6))
