@@ -99,8 +99,8 @@ def _put(
 def _palette_rand(rng: np.random.Generator, size: int = 256) -> np.ndarray:
     """(size, 3) sRGB-encoded colours of one picture: correlated channels around two hues.
 
-    Contrast, edges, lightness and colourfulness come out as those of photographs (`fsid inspect`): a rival is
-    worth nothing where it was not given a fair chance.
+    Contrast and lightness come out close to those of photographs (docs/results.md): a rival is worth nothing
+    where it was not given a fair chance.
     """
     hues = rng.normal(0, 0.25, (2, 3))
     level = rng.normal(rng.uniform(0.25, 0.6), rng.uniform(0.04, 0.2), size).clip(0.02, 1)

@@ -169,9 +169,10 @@ def _data(out: Path, config: ExperimentConfig, source: str, bar: ProgressBar, wo
         count = max(count, len(find_pictures(photos)))
     else:
         pictures = out / "dead-leaves"
-        size = {"height": config.height, "width": config.width}
         with bar("drawing dead leaves", "pictures") as progress:
-            write_dead_leaves(pictures, config.count, **size, seed=seed, progress=progress)
+            write_dead_leaves(
+                pictures, count, height=config.height, width=config.width, seed=seed, progress=progress
+            )
         overrides.append(f"images={pictures.resolve()}")
     settings = load_settings(GenerateConfig, None, overrides)
     with bar(f"pairs from {source}", "pairs") as progress:
