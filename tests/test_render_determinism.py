@@ -145,27 +145,30 @@ from test_render_determinism import CONFIG, sample
 
 def held_bytes():
     gc.collect()
+    renderer._context.finish()
     ctypes.CDLL(None).malloc_trim(0)
     return int(open("/proc/self/statm").read().split()[1]) * 4096
 
 drawn = sample(CONFIG, 1, width=240, height=160)
 with Renderer(texture_size=64) as renderer:
-    for count in (4, 12):
-        for _ in range(count):
-            frame = renderer.render(drawn)
+    for _ in range(20):
+        frame = renderer.render(drawn)
         print(held_bytes())
 """
-"""What is held after warm-up and after twelve frames more; free blocks that malloc keeps are given back."""
+"""What is held after every frame; free blocks that malloc keeps are given back."""
 
 
 def test_memory_does_not_grow() -> None:
-    """In a process of its own, to a quarter of a frame's radiance per frame."""
+    """In a process of its own, to a quarter of a frame's radiance per frame.
+
+    The least of eight frames counts: the driver's threads hold blocks of 9 MB now and then, and let them go.
+    """
     if not hasattr(ctypes.CDLL(None), "malloc_trim"):
         pytest.skip("memory that is free cannot be told from memory that is held: no malloc_trim")
     code = GROWTH.format(path=sys.path)
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    before, after = map(int, run.stdout.split()[-2:])
-    assert after - before < 12 * (240 * 160 * 3 * 4) / 4
+    held = [int(line) for line in run.stdout.split()[-20:]]
+    assert min(held[12:]) - min(held[1:9]) < 11 * (240 * 160 * 3 * 4) / 4
 
 
 CODE = """
