@@ -13,6 +13,7 @@ from fsid.assets import bake_material, build_mesh
 from fsid.errors import FsidError
 from fsid.render import Frame, Renderer
 from fsid.render.reference import ReferenceRenderer, agreement
+from fsid.render.reference import renderer as reference_renderer
 from fsid.render.sky import panorama
 from fsid.scene.model import (
     Background,
@@ -210,7 +211,7 @@ def test_the_rasteriser_agrees_with_the_path_tracer(lights: tuple[str, ...], wid
 def glossy_floor(light: Light, family: str, roughness: float, grey: float = 0.5, **layers: float) -> Scene:
     """A floor of one material, seen askew in a black room."""
     mean = float(bake_material(family, 0, 64).roughness.mean())
-    floor = Material(family, 0, ((0.5, 0.5, 0.5),) * 3, 1.0, 0.0, roughness / mean, 0.0)
+    floor = Material(family, 0, ((grey,) * 3,) * 3, 1.0, 0.0, roughness / mean, 0.0, **layers)
     black = Material("paint", 0, ((0.0, 0.0, 0.0),) * 3, 1.0, 0.0, 10.0, 0.0)
     walls = Background("room", (6.0, 6.0, 4.0), dict.fromkeys(WALLS, black) | {"floor": floor})
     camera = Camera((0.0, -1.0, 0.6), (0.0, 0.2, 0.0), (0.0, 0.0, 1.0), 50.0, 48, 32)
@@ -233,3 +234,23 @@ def test_an_area_light_shines_as_in_the_path_tracer(family: str, roughness: floa
     bright = b > np.quantile(b, 0.8)
     assert np.median(a[b > 0.02 * b.max()] / b[b > 0.02 * b.max()]) == pytest.approx(1.0, abs=0.05)
     assert np.median(a[bright] / b[bright]) == pytest.approx(1.0, abs=0.08)
+
+
+def test_a_coat_reflects_as_a_dielectric_of_the_path_tracer(monkeypatch: pytest.MonkeyPatch):
+    """All of a floor under a point light: on black, what Mitsuba's dielectric of index 1.5 returns."""
+    roughness = 0.4
+    light = Light("point", (0.0, 0.9, 0.8), (0.0, 0.0, -1.0), (6.0, 6.0, 6.0), 0.02, 360.0)
+    scene = glossy_floor(light, "paint", 0.9, 0.0)
+
+    def dielectric(mi, names):
+        gloss = {"type": "principled", "base_color": 0.0, "eta": 1.5, "roughness": roughness}
+        return mi.load_dict({"type": "twosided", "bsdf": gloss})
+
+    with Renderer(texture_size=64) as raster:
+        bare = raster.render(scene).radiance.sum()
+        coated = raster.render(
+            glossy_floor(light, "paint", 0.9, 0.0, clearcoat=1.0, clearcoat_roughness=roughness)
+        )
+    monkeypatch.setattr(reference_renderer, "bsdf_of", dielectric)
+    coat = renderer(256).render(scene).radiance.sum()
+    assert coated.radiance.sum() == pytest.approx(coat + 0.93 * bare, rel=0.04)

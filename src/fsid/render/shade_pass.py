@@ -32,7 +32,7 @@ class ShadePass:
         self._programs: dict[tuple[tuple[str, int], ...], moderngl.Program] = {}
         self._copy = load_program(context, "screen.vert", "copy_result.frag")
         shares = reflectance_table()
-        table = np.concatenate([np.concatenate([shares, np.zeros_like(shares)], axis=-1), lobe_table()])
+        table = np.concatenate([np.pad(shares, ((0, 0), (0, 0), (0, 1))), lobe_table()])
         self._reflectance = context.texture(table.shape[1::-1], 4, table.tobytes(), dtype="f4")
         self._reflectance.repeat_x = self._reflectance.repeat_y = False
 

@@ -1,20 +1,35 @@
 // What a surface does with light that arrives: GGX over a matt body, under clearcoat and cloth's fuzz.
-const float COAT_F0 = 0.04;   // index 1.5
+const float COAT_INDEX = 1.5;   // fsid.render.reflectance
 
-// GGX with height-correlated Smith masking (Heitz 2014) and Schlick's Fresnel: f * cos at the light.
-vec3 reflected(vec3 f0, float alpha, vec3 n, vec3 v, vec3 l) {
+// GGX with height-correlated Smith masking (Heitz 2014), Fresnel's share apart: D G cos(l) / (4 nv nl). vh: cosine at
+// the microfacets.
+float microfacets(float alpha, vec3 n, vec3 v, vec3 l, out float vh) {
     vec3 h = normalize(v + l);
     float nl = max(dot(n, l), 0.0), nv = max(abs(dot(n, v)), 1e-3), nh = max(dot(n, h), 0.0);
     float a2 = alpha * alpha;
     float t = nh * nh * (a2 - 1.0) + 1.0;
     float d = a2 / (PI * t * t);
     float g = nl * sqrt(nv * nv * (1.0 - a2) + a2) + nv * sqrt(nl * nl * (1.0 - a2) + a2);
-    float s = clamp(1.0 - dot(v, h), 0.0, 1.0), s2 = s * s;
-    vec3 f = f0 + (1.0 - f0) * (s2 * s2 * s);
-    return f * (d * 0.5 * nl / max(g, 1e-4));
+    vh = clamp(dot(v, h), 0.0, 1.0);
+    return d * 0.5 * nl / max(g, 1e-4);
+}
+
+// f * cos at the light, with Schlick's Fresnel.
+vec3 reflected(vec3 f0, float alpha, vec3 n, vec3 v, vec3 l) {
+    float vh, share = microfacets(alpha, n, v, l, vh);
+    float s = 1.0 - vh, s2 = s * s;
+    return (f0 + (1.0 - f0) * (s2 * s2 * s)) * share;
 }
 
 #if LOBES
+// f * cos of a clear coat, with Fresnel's equations: at 45 to 65 degrees Schlick's misses 15 to 23 % of index 1.5.
+float coat_reflected(float alpha, vec3 n, vec3 v, vec3 l) {
+    float c, share = microfacets(alpha, n, v, l, c);
+    float g = sqrt(COAT_INDEX * COAT_INDEX - 1.0 + c * c);
+    float across = (g - c) / (g + c), tilt = (c * (g + c) - 1.0) / (c * (g - c) + 1.0);
+    return 0.5 * across * across * (1.0 + tilt * tilt) * share;
+}
+
 // Cloth's fuzz of roughness 0.5 (Estevez and Kulla 2017) with the visibility of Neubelt and Pettineo (2013); f * cos.
 float fuzz(vec3 n, vec3 v, vec3 l) {
     float nl = max(dot(n, l), 0.0), nv = max(abs(dot(n, v)), 1e-3), nh = dot(n, normalize(v + l));
@@ -56,12 +71,11 @@ Reflector reflector_of(Sample p, Surface s, Matter m, float spread) {
     b.diffuse *= 1.0 - s.transmission;
 #endif
 #if LOBES
-    vec2 coat_share = mirror_share(sqrt(s.clearcoat_alpha), nv);
     b.coat_alpha = s.clearcoat_alpha;
     b.sheen = s.sheen;
     b.cloth = s.sheen * fuzz_share(nv);
     b.coated = s.clearcoat * (1.0 - b.cloth);
-    float coat = s.clearcoat * (COAT_F0 * coat_share.x + coat_share.y);
+    float coat = s.clearcoat * reflectance_at(sqrt(s.clearcoat_alpha), nv, 0.0).z;
     b.below = (1.0 - coat) * (1.0 - b.cloth);
     b.coat = coat * (1.0 - b.cloth);
     b.through = b.diffuse * s.translucency * b.below;
@@ -88,7 +102,7 @@ vec3 returned(Light light, Sample p, Reflector b) {
 #if LOBES
     float coat_wide = min(sqrt(b.coat_alpha * b.coat_alpha + 0.25 * angular * angular), 1.0);
     result = result * b.below + b.through * unhindered * (smoothstep(-0.15, 0.0, -ahead) * max(-nl, 0.0) / PI)
-        + (b.coated * reflected(vec3(COAT_F0), coat_wide, b.n, b.v, l) + b.sheen * fuzz(b.n, b.v, l)) * arrives;
+        + (b.coated * coat_reflected(coat_wide, b.n, b.v, l) + b.sheen * fuzz(b.n, b.v, l)) * arrives;
 #endif
 #if AREAS
     bool area = light.kind == AREA;

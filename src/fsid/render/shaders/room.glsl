@@ -28,8 +28,8 @@ vec3 mirrored(vec3 position, vec3 r, float alpha) {
     return mix(wall, cube(mean_sides, r), smoothstep(0.0, 0.4, alpha));
 }
 
-// Share of the surroundings that a surface reflects specularly: scale and offset of f0 (fsid.render.reflectance).
-// In the upper half of the table the bent cosine that such a lobe is (tools/fit_lobes.py): a, b, c, d.
+// Share of the surroundings that a surface reflects specularly: scale and offset of f0, and that of a clear coat
+// (fsid.render.reflectance). In the upper half of the table the bent cosine that such a lobe is (tools/fit_lobes.py): a, b, c, d.
 layout(binding = 14) uniform sampler2D reflectance;
 const float TABLE_EDGE = 0.5 / 32.0;
 vec4 reflectance_at(float roughness, float nv, float part) {
