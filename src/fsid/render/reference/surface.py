@@ -3,8 +3,9 @@
     albedo = lerp(lerp(colour_a, colour_b, mix), colour_c, pattern) * 2 detail      (fsid.assets.maps)
 
 A texture lies on the three axial planes of the object, in metres; where the surface turns from one to the
-next they are blended. Each look-up covers the footprint of a pixel by up to four probes along it, in the mip
-level of its width. Written apart from the shaders on purpose: what both agree on is right or wrong twice.
+next they are blended. Each look-up covers the footprint of a pixel, an ellipse, by up to four probes along
+it, in the mip level of its width. Written apart from the shaders on purpose: what both agree on is right or
+wrong twice.
 """
 
 from __future__ import annotations
@@ -113,10 +114,9 @@ def _probe(
         return np.stack([(u * vectors).sum(1), (v * vectors).sum(1)], axis=-1) / material.tile_m
 
     uv = tiles(points.position) + _OFFSET * axis
-    gx, gy = tiles(points.along_x), tiles(points.along_y)
-    lx, ly = np.linalg.norm(gx, axis=1), np.linalg.norm(gy, axis=1)
-    along = np.where((lx > ly)[:, None], gx, gy)
-    longest, across = np.maximum(lx, ly), np.maximum(np.minimum(lx, ly), 1e-8)
+    axes, lengths, _ = np.linalg.svd(np.stack([tiles(points.along_x), tiles(points.along_y)], axis=-1))
+    longest, across = lengths[:, 0], np.maximum(lengths[:, 1], 1e-8)
+    along = axes[..., 0] * longest[:, None]
     probes = np.clip(np.ceil(longest / across - 0.5), 1, MAX_PROBES)
     total = np.zeros((len(uv), 8), np.float32)
     for k in range(MAX_PROBES):

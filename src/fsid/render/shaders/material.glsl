@@ -26,6 +26,16 @@ void face_axes(int axis, float side, out vec3 u, out vec3 v) {
 vec3 into(vec3 rows[3], vec3 world) { return world.x * rows[0] + world.y * rows[1] + world.z * rows[2]; }
 vec3 out_of(vec3 rows[3], vec3 v) { return vec3(dot(rows[0], v), dot(rows[1], v), dot(rows[2], v)); }
 
+// A pixel's footprint has the second moments of the ellipse whose axes are those of (gx gy), however gx and gy
+// lie to each other (Heckbert 1989): the longer one, and the length of the shorter.
+vec2 longest_axis(vec2 gx, vec2 gy, out float shorter) {
+    float lx = dot(gx, gx), ly = dot(gy, gy), both = dot(gx, gy);
+    float most = 0.5 * (lx + ly + sqrt((lx - ly) * (lx - ly) + 4.0 * both * both));
+    vec2 share = lx >= ly ? vec2(most - ly + 1e-30, both) : vec2(both, most - lx + 1e-30);
+    shorter = abs(gx.x * gy.y - gx.y * gy.x) * inversesqrt(max(most, 1e-30));
+    return (share.x * gx + share.y * gy) * inversesqrt(max(dot(share, share), 1e-36));
+}
+
 // position, normal: world. dx, dy: from this pixel's position to those of its neighbours.
 Matter matter_at(Surface s, vec3 position, vec3 normal, vec3 dx, vec3 dy) {
     vec3 n = into(s.place, normal);
@@ -51,9 +61,9 @@ Matter matter_at(Surface s, vec3 position, vec3 normal, vec3 dx, vec3 dy) {
         vec2 gy = vec2(dot(tu, my), dot(tv, my)) * s.tiles_per_m;
         // Long footprints are covered by several probes along their length: written out, because drivers
         // differ in their anisotropic filter (and some take seconds for one frame of it).
-        float lx = dot(gx, gx), ly = dot(gy, gy);
-        vec2 along = lx > ly ? gx : gy;
-        float longest = SHARPEN * sqrt(max(lx, ly)), across = max(SHARPEN * sqrt(min(lx, ly)), 1e-8);
+        float reach;
+        vec2 along = longest_axis(gx, gy, reach);
+        float longest = SHARPEN * length(along), across = max(SHARPEN * reach, 1e-8);
         int probes = int(clamp(ceil(longest / across - 0.25), 1.0, max_probes));
         float level = log2(max(longest / float(probes), across) * texels);
         vec4 m = vec4(0), r = vec4(0);
