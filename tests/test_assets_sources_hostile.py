@@ -213,6 +213,20 @@ def test_a_library_without_a_catalogue_or_with_a_damaged_member(tmp_path: Path):
     assert "damaged" in refused(tmp_path)
 
 
+def test_names_and_licences_that_are_no_text_can_be_printed(tmp_path: Path):
+    """A name that no JSON, hash or terminal takes is left out; a licence is shown with escapes."""
+    content = GOOD.export(file_type="obj").encode()
+    Path(os.fsdecode(os.fsencode(tmp_path) + b"/\xff.obj")).write_bytes(content)
+    catalogue = "model#1=\\ud800.obj\nmodel#2=a.obj\nlicense#2=\\udfff\n"
+    library(tmp_path / "x.sh3f", catalogue, {"a.obj": content})
+    survey = survey_meshes(str(tmp_path))
+    ((name, licence),) = [(source.name, source.licence) for source in survey.usable]
+    assert name == f"file:{tmp_path}/x.sh3f!a.obj"
+    assert licence == "\\udfff"
+    assert len(survey.skipped) == 2
+    assert all(f"{name}: {reason}".encode() for name, reason in survey.skipped)
+
+
 def test_a_zip_that_states_a_huge_directory_is_not_opened(tmp_path: Path):
     library(tmp_path / "x.sh3f", "model#1=a.obj\n", {})
     data = bytearray((tmp_path / "x.sh3f").read_bytes())

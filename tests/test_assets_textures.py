@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import struct
 import zlib
 from pathlib import Path
@@ -94,6 +95,73 @@ def test_both_naming_schemes_are_found_with_whatever_maps_they_have(folder):
     assert rock.roughness.mean() == pytest.approx(0.6, abs=0.01)
     assert rock.metallic.mean() == pytest.approx(0.9, abs=0.01)
     assert material_tile_m(names[0]) == bricks.tile_m == TILE_M
+
+
+def save_exr(path: Path, image: np.ndarray, names: str) -> None:
+    import OpenEXR
+
+    planes = np.moveaxis(np.atleast_3d(image).astype(np.float32), -1, 0)
+    channels = {name: np.ascontiguousarray(plane) for name, plane in zip(names, planes, strict=True)}
+    path.parent.mkdir(parents=True, exist_ok=True)
+    OpenEXR.File({"type": OpenEXR.scanlineimage}, channels).write(str(path))
+
+
+def test_maps_of_data_may_be_openexr_as_in_the_archives_of_poly_haven(tmp_path):
+    height, normal = hill()
+    for place in ("png", "exr"):
+        save(tmp_path / place / "rock_diff_1k.jpg", picture(2))
+    save(tmp_path / "png" / "rock_nor_gl_1k.png", normal)
+    save(tmp_path / "png" / "rock_rough_1k.png", 0.5 + 10 * height)
+    save(tmp_path / "png" / "rock_disp_1k.png", np.uint16(65535 * np.clip(0.5 + 9 * height, 0, 1)))
+    save_exr(tmp_path / "exr" / "rock_nor_gl_1k.exr", normal, "RGB")
+    save_exr(tmp_path / "exr" / "rock_rough_1k.exr", 0.5 + 10 * height, "Y")
+    save_exr(tmp_path / "exr" / "rock_disp_1k.exr", 100 * height, "Y")
+    exr, png = (bake_material(f"file:{tmp_path / place}", 0, SIZE) for place in ("exr", "png"))
+    for key in ("mix", "pattern", "detail", "roughness", "height", "metallic"):
+        np.testing.assert_allclose(getattr(exr, key), getattr(png, key), atol=0.01, err_msg=key)
+    assert exr.relief_m == pytest.approx(png.relief_m, rel=0.02)
+
+
+def test_an_exr_that_is_no_map_is_left_out(tmp_path, monkeypatch):
+    monkeypatch.setattr(files, "MAX_PIXELS", SIZE * SIZE)
+    grey = np.full((SIZE, SIZE), 0.5)
+    for name in ("good", "nan", "large", "small", "page", "cut"):
+        save(tmp_path / f"{name}_diff_1k.jpg", picture())
+        save_exr(tmp_path / f"{name}_rough_1k.exr", grey, "Y")
+    save_exr(tmp_path / "only_diff_1k.exr", picture() / 255, "RGB")
+    save_exr(tmp_path / "nan_rough_1k.exr", grey * np.nan, "Y")
+    save_exr(tmp_path / "large_rough_1k.exr", np.ones((SIZE, SIZE + 2)), "Y")
+    save_exr(tmp_path / "small_rough_1k.exr", np.ones((4, 4)), "Y")
+    (tmp_path / "page_rough_1k.exr").write_text("<html>404</html>")
+    cut = tmp_path / "cut_rough_1k.exr"
+    cut.write_bytes(cut.read_bytes()[:-20])
+    survey = survey_textures(str(tmp_path))
+    assert survey.usable == (f"file:{tmp_path / 'good_1k'}",)
+    reasons = {Path(name).name: reason for name, reason in survey.skipped}
+    assert set(reasons) == {"nan_1k", "large_1k", "small_1k", "page_1k", "cut_1k", "only_1k"}
+    assert "JPEG or PNG" in reasons["only_1k"]
+    assert "more than" in reasons["large_1k"]
+    assert "not numbers" in reasons["nan_1k"]
+
+
+def test_a_set_in_several_colours_shows_the_first(tmp_path):
+    save(tmp_path / "cloth_07_col_1_1k.png", picture(1))
+    save(tmp_path / "cloth_07_col_2_1k.png", picture(2))
+    save(tmp_path / "plaid_col_01_2k.png", picture(3))
+    names = texture_sources(tmp_path)
+    assert names == tuple(f"file:{tmp_path / name}" for name in ("cloth_07_1k", "plaid_2k"))
+    assert files.set_at(tmp_path / "cloth_07_1k").files == {"colour": tmp_path / "cloth_07_col_1_1k.png"}
+
+
+def test_a_name_that_is_no_text_is_left_out(tmp_path):
+    save(tmp_path / "good_Color.png", picture())
+    bad = os.fsencode(tmp_path) + b"/\xff_Color.png"
+    Path(os.fsdecode(bad)).write_bytes((tmp_path / "good_Color.png").read_bytes())
+    survey = survey_textures(str(tmp_path))
+    assert survey.usable == (f"file:{tmp_path / 'good'}",)
+    ((name, reason),) = survey.skipped
+    assert name.encode()
+    assert "UTF-8" in reason
 
 
 def test_colours_are_those_of_the_picture(folder):

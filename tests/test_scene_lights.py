@@ -1,18 +1,19 @@
 """Laws of light and finish: adaptation, lobes by kind, and files in place of families."""
 
 import dataclasses
+import os
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from fsid.assets import PART_KINDS, material_families
+from fsid.assets import PART_KINDS, material_families, survey_skies
 from fsid.errors import FsidError
 from fsid.scene import BackgroundConfig, LightConfig, MaterialConfig, SceneConfig, sample
 from fsid.scene.lobes import EMISSION, LOBES, lobes_rand
 from fsid.scene.materials import PLAIN
 from fsid.scene.pools import POOLS
-from fsid.scene.sources import sky_rand
+from fsid.scene.sources import mesh_rand, sky_rand
 
 ROOM = BackgroundConfig(kind_shares=(1.0, 0.0, 0.0, 0.0))
 OUTSIDE = BackgroundConfig(kind_shares=(0.0, 0.0, 0.0, 1.0))
@@ -95,13 +96,39 @@ def test_lamps_and_screens_are_lit_in_the_configured_share():
         assert ((found == 0) | ((found >= low) & (found <= high))).all()
 
 
+def _radiance_header(width: int, height: int) -> bytes:
+    return b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y %d +X %d\n" % (height, width)
+
+
+def _exr(path: Path, width: int, height: int, names: str = "RGB") -> None:
+    import OpenEXR
+
+    channels = {name: np.ones((height, width), np.float32) for name in names}
+    OpenEXR.File({"type": OpenEXR.scanlineimage}, channels).write(str(path))
+
+
 def test_skies_come_from_a_folder(tmp_path: Path):
-    for name in ("dawn.hdr", "noon.exr", "notes.txt"):
-        (tmp_path / name).touch()
+    """What is no panorama is left out with its reason, and never ends a run."""
+    (tmp_path / "dawn.hdr").write_bytes(_radiance_header(64, 32))
+    _exr(tmp_path / "noon.EXR", 64, 32)
+    (tmp_path / "notes.txt").touch()
+    _exr(tmp_path / "render.exr", 64, 36)
+    _exr(tmp_path / "depth.exr", 64, 32, names="Z")
+    (tmp_path / "page.hdr").write_text("<html>404</html>")
+    (tmp_path / "page.exr").write_text("<html>404</html>")
+    (tmp_path / "wide.hdr").write_bytes(_radiance_header(64, 33))
+    (tmp_path / "empty.hdr").touch()
+    (tmp_path / "folder.hdr").mkdir()
+    (tmp_path / "dangling.hdr").symlink_to(tmp_path / "nowhere.hdr")
+    Path(os.fsdecode(os.fsencode(tmp_path) + b"/\xff.hdr")).write_bytes(_radiance_header(64, 32))
     config = SceneConfig(hdri_folder=str(tmp_path), hdri_share=1.0)
     rng = np.random.default_rng(0)
     found = {sky_rand(rng, config) for _ in range(30)}
-    assert found == {f"file:{tmp_path / name}" for name in ("dawn.hdr", "noon.exr")}
+    assert found == {f"file:{tmp_path / name}" for name in ("dawn.hdr", "noon.EXR")}
+    reasons = dict(survey_skies(str(tmp_path)).skipped)
+    assert len(reasons) == 9
+    assert "64 x 36 pixels" in reasons[f"file:{tmp_path / 'render.exr'}"]
+    assert all(f"{name}: {reason}".encode() and "\n" not in reason for name, reason in reasons.items())
     assert sky_rand(rng, SceneConfig()) == "procedural"
 
 
@@ -141,6 +168,36 @@ def test_meshes_and_textures_come_from_folders_wherever_these_lie(tmp_path: Path
         assert "toy_blocks" in names[:8]
         assert any(name.startswith("file:") for name in names[8:])
     assert drawn["here"] == drawn["there"]
+
+
+def test_a_folder_may_be_named_in_any_way(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """A trailing or leading "./" is no other folder: the same seed draws the same files."""
+    folder = tmp_path / "meshes"
+    folder.mkdir()
+    for name in "abcdefgh":
+        (folder / f"{name}.obj").write_text(_TETRAHEDRON)
+    monkeypatch.chdir(tmp_path)
+
+    def drawn(place: str) -> list[str]:
+        rng = np.random.default_rng(1)
+        config = SceneConfig(mesh_folders=(place,), mesh_folder_share=1.0)
+        return [Path(mesh_rand(rng, config).removeprefix("file:")).name for _ in range(12)]
+
+    first = drawn(str(folder))
+    assert len(set(first)) > 3
+    assert all(drawn(place) == first for place in ("meshes", "meshes/", "./meshes", f"{folder}/"))
+    monkeypatch.chdir(folder)
+    assert drawn(".") == first
+
+
+def test_files_of_one_name_in_two_folders_are_all_drawn(tmp_path: Path):
+    for place in ("one", "two"):
+        (tmp_path / place).mkdir()
+        (tmp_path / place / "same.obj").write_text(_TETRAHEDRON)
+    config = SceneConfig(mesh_folders=(str(tmp_path / "one"), str(tmp_path / "two")), mesh_folder_share=1.0)
+    rng = np.random.default_rng(2)
+    found = {mesh_rand(rng, config).removeprefix(f"file:{tmp_path}") for _ in range(20)}
+    assert found == {"/one/same.obj", "/two/same.obj"}
 
 
 _TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"

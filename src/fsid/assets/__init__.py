@@ -16,7 +16,8 @@ from fsid.assets.registry import (
     build_mesh,
     mesh_families,
 )
-from fsid.assets.sources import mesh_sources
+from fsid.assets.skies import sky_sources, survey_skies
+from fsid.assets.sources import mesh_sources, survey_meshes
 from fsid.assets.textures import TextureSurvey, survey_textures, texture_sources
 
 __all__ = [
@@ -36,6 +37,9 @@ __all__ = [
     "mesh_families",
     "mesh_sources",
     "part_kind",
+    "sky_sources",
+    "survey_meshes",
+    "survey_skies",
     "survey_textures",
     "sweep_radius_m",
     "table_size_m",

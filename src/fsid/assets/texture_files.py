@@ -3,8 +3,9 @@
     ambientCG    Bricks001_1K-JPG_Color.jpg   _NormalGL _NormalDX _Roughness _Metalness _Displacement
     Poly Haven   rock_wall_diff_1k.jpg        _nor_gl_ _nor_dx_ _rough_ _metal_ _disp_ _arm_
 
-Images come from the internet: a header may promise any size and data may end anywhere. What a header says is
-compared with the limits before a pixel is read, and only formats with a small, well-tested decoder are read.
+Maps of data (all but the colour and the packed one) may be OpenEXR, as in the archives of Poly Haven. Images
+come from the internet: a header may promise any size and data may end anywhere. What a header says is
+compared with the limits before a pixel is read, and only formats with a well-tested decoder are read.
 """
 
 from __future__ import annotations
@@ -23,16 +24,18 @@ from PIL import Image
 MAX_FILE_BYTES = 128 * 2**20
 MAX_PIXELS = 8192 * 8192
 
-_SUFFIXES = r"\.(?:jpe?g|png)$"
+EXR_SUFFIX = ".exr"
+_SUFFIXES = r"(?P<suffix>\.(?:jpe?g|png|exr))"
 _AMBIENT_CG = re.compile(
     r"(?P<set>.+)_(?P<map>color|normalgl|normaldx|roughness|metalness|displacement)" + _SUFFIXES,
     re.IGNORECASE,
 )
 _POLY_HAVEN = re.compile(
-    r"(?P<set>.+)_(?P<map>diff|diffuse|col|albedo|nor_gl|nor_dx|rough|metal|disp|arm)_(?P<size>\d+k)"
+    r"(?P<set>.+)_(?P<map>diff|diffuse|col|albedo|nor_gl|nor_dx|rough|metal|disp|arm)(?:_0?\d)?_(?P<size>\d+k)"
     + _SUFFIXES,
     re.IGNORECASE,
 )
+_NEVER_EXR = ("colour", "arm")
 _ROLES = {
     **dict.fromkeys(("color", "diff", "diffuse", "col", "albedo"), "colour"),
     **dict.fromkeys(("normalgl", "nor_gl"), "normal_gl"),
@@ -67,7 +70,10 @@ def sets_below(path: Path, deep: bool = True) -> list[TextureSet]:
             if match:
                 parts = match.groupdict()
                 stem = parts["set"] + (f"_{parts['size']}" if parts.get("size") else "")
-                found[Path(folder) / stem].setdefault(_ROLES[parts["map"].lower()], Path(folder) / name)
+                role = _ROLES[parts["map"].lower()]
+                files = found[Path(folder) / stem]
+                if parts["suffix"].lower() != EXR_SUFFIX or role not in _NEVER_EXR:
+                    files.setdefault(role, Path(folder) / name)
     return [TextureSet(key, found[key]) for key in sorted(found)]
 
 
@@ -98,6 +104,46 @@ def read_bounded(path: Path) -> bytes:
     return data
 
 
+def decode_file(path: Path, data: bytes, size: int) -> np.ndarray:
+    """(H, W, C) float32 of a file whose content is `data`; see `decode_image`, `decode_exr`."""
+    return decode_exr(path) if path.suffix.lower() == EXR_SUFFIX else decode_image(data, path.name, size)
+
+
+def decode_exr(path: Path) -> np.ndarray:
+    """(H, W, C) float32 of R, G and B (C 3) or of the first channel (C 1), as stored: a displacement may be
+    in any unit. Raises RefusedImageError that names the file.
+    """
+    import OpenEXR  # only users of such files need it
+
+    try:
+        with OpenEXR.File(str(path), header_only=True) as file:
+            low, high = (np.asarray(corner, np.int64) for corner in file.header()["dataWindow"])
+        width, height = (int(side) for side in high - low + 1)
+        _check_size(path.name, width, height)
+        with OpenEXR.File(str(path), separate_channels=True) as file:
+            channels = {name: channel.pixels for name, channel in file.channels().items()}
+        names = ("R", "G", "B") if {"R", "G", "B"} <= set(channels) else sorted(channels)[:1]
+        pixels = np.stack([np.asarray(channels[name], np.float32) for name in names], axis=-1)
+    except (OSError, RuntimeError, ValueError, KeyError, TypeError, MemoryError) as error:
+        raise RefusedImageError(f"{path.name} is no readable OpenEXR picture ({error})") from None
+    if pixels.shape[:2] != (height, width) or not np.isfinite(pixels).all():
+        raise RefusedImageError(f"{path.name} has subsampled channels or values that are not numbers")
+    return pixels
+
+
+def within_one(pixels: np.ndarray) -> np.ndarray:
+    """`pixels` where they lie in 0..1, else stretched to it."""
+    low, span = float(pixels.min()), float(np.ptp(pixels))
+    return pixels if low >= 0 and low + span <= 1 else (pixels - low) / np.float32(max(span, 1e-12))
+
+
+def _check_size(name: str, width: int, height: int) -> None:
+    if width * height > MAX_PIXELS:
+        raise RefusedImageError(f"{name} has {width} x {height} pixels, more than {MAX_PIXELS >> 20} million")
+    if min(width, height) < 8:
+        raise RefusedImageError(f"{name} has {width} x {height} pixels, fewer than 8 x 8")
+
+
 def decode_image(data: bytes, name: str, size: int) -> np.ndarray:
     """(H, W, C) float32 in 0..1 as encoded, C 1 or 3; a JPEG much larger than `size` comes reduced.
 
@@ -107,13 +153,7 @@ def decode_image(data: bytes, name: str, size: int) -> np.ndarray:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
             image = Image.open(BytesIO(data), formats=("JPEG", "PNG"))
-        width, height = image.size
-        if width * height > MAX_PIXELS:
-            raise RefusedImageError(
-                f"{name} has {width} x {height} pixels, more than {MAX_PIXELS >> 20} million"
-            )
-        if min(width, height) < 8:
-            raise RefusedImageError(f"{name} has {width} x {height} pixels, fewer than 8 x 8")
+        _check_size(name, *image.size)
         image.draft(image.mode, (2 * size, 2 * size))
         if image.mode.startswith("I"):
             return np.asarray(image, dtype=np.float32)[..., None] / np.float32(65535)

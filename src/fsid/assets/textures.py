@@ -20,15 +20,17 @@ import numpy as np
 from scipy.fft import irfft2, rfft2
 
 from fsid.assets.bake_cache import cached, code_key, content_key
+from fsid.assets.file_names import NOT_TEXT, shown
 from fsid.assets.maps import MaterialMaps
 from fsid.assets.texture_files import (
     RefusedImageError,
     TextureSet,
-    decode_image,
+    decode_file,
     read_bounded,
     resampled,
     set_at,
     sets_below,
+    within_one,
 )
 from fsid.assets.triangle import Triple, enclosing, encode, srgb_to_linear
 from fsid.errors import FsidError
@@ -69,6 +71,9 @@ def survey_textures(path: str) -> TextureSurvey:
     usable, skipped = [], []
     for found in sets_below(Path(path)):
         name = f"{PREFIX}{found.path}"
+        if shown(name) != name:
+            skipped.append((shown(name), NOT_TEXT))
+            continue
         try:
             _bake(found, 64)
             usable.append(name)
@@ -116,14 +121,15 @@ def _bake(found: TextureSet, size: int) -> MaterialMaps:
 
 def _maps(found: TextureSet, data: dict[str, bytes], size: int) -> MaterialMaps:
     if "colour" not in data:
-        raise RefusedImageError("no colour map")
+        raise RefusedImageError("no colour map (JPEG or PNG)")
 
     def image(role: str) -> np.ndarray:
         """(S, S, 3) as encoded."""
-        pixels = resampled(decode_image(data[role], found.files[role].name, size), size)
+        pixels = decode_file(found.files[role], data[role], size)
+        pixels = resampled(within_one(pixels) if role == "height" else pixels, size)
         return np.broadcast_to(pixels, (size, size, 3))
 
-    colours, rgb = _colour(data["colour"], found.files["colour"].name, size)
+    colours, rgb = _colour(found.files["colour"], data["colour"], size)
     mix, pattern, detail = encode(rgb, colours)
     arm = image("arm") if "arm" in data else None
     flat = np.zeros((size, size), np.float32)
@@ -150,9 +156,9 @@ def _maps(found: TextureSet, data: dict[str, bytes], size: int) -> MaterialMaps:
     )
 
 
-def _colour(data: bytes, name: str, size: int) -> tuple[Triple, np.ndarray]:
+def _colour(path: Path, data: bytes, size: int) -> tuple[Triple, np.ndarray]:
     """The picture's triangle, the same at every size, and the picture itself, linear (S, S, 3)."""
-    pixels = decode_image(data, name, max(size, _TRIANGLE_PX))
+    pixels = decode_file(path, data, max(size, _TRIANGLE_PX))
     linear = np.broadcast_to(srgb_to_linear(pixels), (*pixels.shape[:2], 3))
     reference = resampled(linear, _TRIANGLE_PX)
     return enclosing(reference.reshape(-1, 3)), resampled(linear, size)

@@ -1,6 +1,7 @@
 """Where S, M and the sky come from: the families of FSID, and the folders that the user names.
 
-Files are told apart by their path inside their folder, so a folder may move without changing a scene.
+Files are told apart by their path inside their folder, so a folder may move, and may be named in any way
+("skies", "./skies/"), without changing a scene.
 """
 
 from __future__ import annotations
@@ -11,13 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
-from fsid.assets import material_families, mesh_families, mesh_sources, texture_sources
-from fsid.errors import FsidError
+from fsid.assets import material_families, mesh_families, mesh_sources, sky_sources, texture_sources
 from fsid.scene.choice import pick_rand
 from fsid.scene.config import SceneConfig
 
 FILE = "file:"
-_SKY_SUFFIXES = (".hdr", ".exr")
 
 Names = tuple[str, ...]
 
@@ -38,7 +37,7 @@ def texture_rand(rng: np.random.Generator, config: SceneConfig) -> str:
 def sky_rand(rng: np.random.Generator, config: SceneConfig) -> str:
     """A name for `Sky.source`."""
     folders = (config.hdri_folder,) if config.hdri_folder else ()
-    return _rand(rng, ("procedural",), folders, config.hdri_share, _skies)
+    return _rand(rng, ("procedural",), folders, config.hdri_share, sky_sources)
 
 
 def _rand(
@@ -55,23 +54,24 @@ def _rand(
 
 @lru_cache(maxsize=16)
 def _catalogue(folders: Names, find: Callable[[str], Names]) -> tuple[Names, Names]:
-    """The names of all files, and what they are called within their folder."""
-    found = [
-        (name, name.removeprefix(FILE).removeprefix(folder)) for folder in folders for name in find(folder)
-    ]
-    names, labels = zip(*found, strict=True)
-    return names, labels
+    """The names of all files, and what they are called within their folder; no two are called alike."""
+    names: list[str] = []
+    labels: dict[str, None] = {}
+    for folder in folders:
+        for name in find(folder):
+            label = _label(name, folder)
+            while label in labels:
+                label += "'"
+            labels[label] = None
+            names.append(name)
+    return tuple(names), tuple(labels)
+
+
+def _label(name: str, folder: str) -> str:
+    """The path inside the folder, with the separator in front."""
+    path, place = name.removeprefix(FILE), str(Path(folder))
+    return f"/{path}" if place == "." else path.removeprefix(place)
 
 
 def _free_meshes(folder: str) -> Names:
     return mesh_sources(folder, cc0_only=True)
-
-
-def _skies(folder: str) -> Names:
-    """The panoramas directly inside a folder, sorted by name."""
-    if not Path(folder).is_dir():
-        raise FsidError(f"{folder}: there is no such folder of skies")
-    files = sorted(path for path in Path(folder).iterdir() if path.suffix.lower() in _SKY_SUFFIXES)
-    if not files:
-        raise FsidError(f"{folder}: holds no panorama ({', '.join(_SKY_SUFFIXES)})")
-    return tuple(f"{FILE}{path}" for path in files)

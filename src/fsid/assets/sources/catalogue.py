@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fsid.assets.file_names import shown
 from fsid.assets.sources.limits import (
     MAX_ARCHIVE_BYTES,
     MAX_CATALOGUE_BYTES,
@@ -104,7 +105,7 @@ def _entry(values: dict[str, str], number: str, archive: zipfile.ZipFile) -> Ent
     rotation = _floats(values.get(f"modelRotation#{number}", ""), 9)
     return Entry(
         member=member,
-        licence=values.get(f"license#{number}", values.get("license", "")),
+        licence=shown(values.get(f"license#{number}", values.get("license", ""))),
         size_m=None if sides is None or not (sides > 0).all() else np.clip(sides / 100, 1e-4, 1e3),
         rotation=np.eye(3) if rotation is None else rotation.reshape(3, 3),
         present=member in archive.NameToInfo,

@@ -20,6 +20,7 @@ from urllib.parse import unquote
 
 import numpy as np
 
+from fsid.assets.file_names import NOT_TEXT, shown
 from fsid.assets.mesh import Mesh
 from fsid.assets.sources.cache import (
     cache_key,
@@ -85,6 +86,9 @@ def survey_meshes(
     usable = []
     for done, (name, licence) in enumerate(found):
         progress(done, len(found))
+        if shown(name) != name:
+            skipped.append((shown(name), NOT_TEXT))
+            continue
         if cc0_only and not _CC0.search(licence):
             skipped.append((name, f"licence '{licence or 'unknown'}' is not CC0"))
             continue
@@ -153,7 +157,7 @@ def _candidates(path: Path) -> tuple[list[tuple[str, str]], list[tuple[str, str]
         try:
             found += [(f"{PREFIX}{file}!{e.member}", e.licence) for e in _catalogue(file)]
         except RefusedError as error:
-            skipped.append((f"{PREFIX}{file}", str(error)))
+            skipped.append((shown(f"{PREFIX}{file}"), str(error)))
     return list(dict.fromkeys(found)), skipped
 
 

@@ -55,7 +55,8 @@ def _geometries(data: bytes, suffix: str, fetch: Fetch) -> list[tuple[str, np.nd
         matrix, name = loaded.graph[node]
         geometry = loaded.geometry[name]
         if hasattr(geometry, "faces"):
-            points = geometry.vertices @ matrix[:3, :3].T + matrix[:3, 3]
+            with np.errstate(all="ignore"):  # points that are not finite are dropped later
+                points = geometry.vertices @ matrix[:3, :3].T + matrix[:3, 3]
             pieces.append((str(name), points, geometry.faces))
     return pieces
 

@@ -1,0 +1,90 @@
+"""Panoramas of a folder for the sky; what its header shows to be something else is left out and counted.
+
+    width = 2 height, height >= 16, channels R, G, B        Radiance .hdr with rows from the top, or OpenEXR
+
+Folders of downloads hold previews, plain renders and saved error pages; only headers are read here, because
+the pixels of a large panorama take seconds. Who reads them (`fsid.render.sky`) believes nothing either.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from fsid.assets.file_names import NOT_TEXT, shown
+from fsid.errors import FsidError
+
+SKY_SUFFIXES = (".hdr", ".exr")
+LEAST_HEIGHT_PX = 16
+_HEADER_BYTES = 65536
+_RADIANCE = re.compile(rb"#\?.*?\n\n-Y (\d{1,6}) \+X (\d{1,6})\n", re.DOTALL)
+
+
+@dataclass(frozen=True)
+class SkySurvey:
+    """usable: names for `Sky.source`, sorted. skipped: (name, reason) of all others."""
+
+    usable: tuple[str, ...]
+    skipped: tuple[tuple[str, str], ...]
+
+
+def sky_sources(folder: str | os.PathLike[str]) -> tuple[str, ...]:
+    """Names of the usable panoramas directly inside a folder, for `Sky.source`. See `survey_skies`."""
+    return survey_skies(os.fspath(folder)).usable
+
+
+@lru_cache(maxsize=32)
+def survey_skies(folder: str) -> SkySurvey:
+    """Every .hdr and .exr directly inside a folder. Raises FsidError where there is none to use."""
+    if not Path(folder).is_dir():
+        raise FsidError(f"{folder}: there is no such folder of skies")
+    usable, skipped = [], []
+    for path in sorted(path for path in Path(folder).iterdir() if path.suffix.lower() in SKY_SUFFIXES):
+        reason = _flaw(path)
+        if reason:
+            skipped.append((shown(f"file:{path}"), reason))
+        else:
+            usable.append(f"file:{path}")
+    if not usable:
+        why = f"; the first of {len(skipped)} skipped: {skipped[0][1]}" if skipped else ""
+        raise FsidError(f"{folder}: holds no panorama ({', '.join(SKY_SUFFIXES)}){why}")
+    return SkySurvey(tuple(usable), tuple(skipped))
+
+
+def _flaw(path: Path) -> str:
+    """Why a file is no panorama, "" where its header says that it is one."""
+    if shown(str(path)) != str(path):
+        return NOT_TEXT
+    if not path.is_file():
+        return "is missing or not a file"
+    try:
+        size = _exr_size(path) if path.suffix.lower() == ".exr" else _radiance_size(path)
+    except (OSError, RuntimeError, ValueError, KeyError, TypeError) as error:
+        return f"cannot be read ({error})"
+    if size is None:
+        return "is no Radiance or OpenEXR picture with R, G and B and rows from the top"
+    width, height = size
+    if width != 2 * height or height < LEAST_HEIGHT_PX:
+        return f"{width} x {height} pixels are no equirectangular picture (twice as wide as high)"
+    return ""
+
+
+def _radiance_size(path: Path) -> tuple[int, int] | None:
+    """(width, height) of a .hdr."""
+    with path.open("rb") as file:
+        found = _RADIANCE.match(file.read(_HEADER_BYTES))
+    return (int(found[2]), int(found[1])) if found else None
+
+
+def _exr_size(path: Path) -> tuple[int, int] | None:
+    """(width, height) of the first part of a .exr."""
+    import OpenEXR  # only users of such files need it
+
+    with OpenEXR.File(str(path), header_only=True) as file:
+        header = file.header()
+        (left, top), (right, bottom) = (corner.tolist() for corner in header["dataWindow"])
+        names = {channel.name for channel in header["channels"]}
+    return (right - left + 1, bottom - top + 1) if {"R", "G", "B"} <= names else None
