@@ -18,7 +18,7 @@ from fsid.cli.main import main  # noqa: E402
 from fsid.denoise import ModelCard, NetworkConfig, RawDenoiser, denoise_raw, load_model, save_model  # noqa: E402
 from fsid.denoise import model as model_module  # noqa: E402
 from fsid.denoise.export import export  # noqa: E402
-from fsid.denoise.files import noise_of  # noqa: E402
+from fsid.denoise.files import denoise_file, noise_of  # noqa: E402
 from fsid.denoise.preview import PREVIEW_PX, preview_of  # noqa: E402
 from fsid.errors import FsidError  # noqa: E402
 from fsid.sensor import Raw, develop, load_profile, noisy_from_clean, read_raw, write_dng  # noqa: E402
@@ -115,7 +115,7 @@ def test_strength(network: Path) -> None:
     stronger = type(raw.noise)(tuple(4 * k for k in raw.noise.k), tuple(4 * s for s in raw.noise.sigma2))
     np.testing.assert_array_equal(doubled, denoise_raw(raw, model, stronger).mosaic)
     assert np.abs(doubled - full).mean() > 1e-4
-    for wrong in (-0.1, np.nan, np.inf):
+    for wrong in (-0.1, np.nan, np.inf, 1e200):
         with pytest.raises(FsidError, match="strength"):
             denoise_raw(raw, model, strength=wrong)
 
@@ -139,9 +139,51 @@ def test_a_folder_is_done_file_by_file(
     assert "aa.dng" in told
     assert "1 of 3 files" in told
     assert sorted(path.name for path in (tmp_path / "again").iterdir()) == ["a.dng", "b.dng"]
+    (folder / "0.nef").write_text("broken, and first: nothing may be written before the folder is refused")
+    before = {path: path.read_bytes() for path in folder.iterdir()}
     with pytest.raises(SystemExit):
         main(["denoise", str(folder), str(folder), "--model", str(network), "--quiet"])
-    assert "overwritten" in capsys.readouterr().err
+    told = capsys.readouterr().err
+    assert "overwritten" in told
+    assert "0.nef" not in told
+    assert {path: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def test_an_original_is_not_overwritten(
+    noisy_file: Path, network: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = noisy_file.read_bytes()
+    (noisy_file.parent / "sub").mkdir()
+    for same in (noisy_file, noisy_file.parent / "sub" / ".." / noisy_file.name):
+        with pytest.raises(SystemExit):
+            main(["denoise", str(noisy_file), str(same), "--model", str(network), "--quiet"])
+        assert "original" in capsys.readouterr().err
+    assert noisy_file.read_bytes() == before
+
+
+def test_a_folder_that_is_not_there_is_said_before_the_work(noisy_file: Path, network: Path) -> None:
+    def never(done: int, tiles: int) -> None:
+        raise AssertionError("denoised a tile that cannot be written")
+
+    with pytest.raises(FsidError, match="no such folder"):
+        denoise_file(noisy_file, noisy_file.parent / "none" / "out.dng", load_model(network), progress=never)
+
+
+def test_a_folder_of_bare_mosaics(
+    tmp_path: Path, network: Path, rng: np.random.Generator, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "in"
+    folder.mkdir()
+    for name in ("a", "b"):
+        np.save(folder / f"{name}.npy", rng.integers(64, 1023, (48, 64), dtype=np.uint16))
+    command = ["denoise", str(folder), str(tmp_path / "out"), "--model", str(network), "--quiet"]
+    command += ["--profile", "pixel6", "--iso", "3200"]
+    with pytest.raises(SystemExit):
+        main(command)
+    assert "holds no RAW file" in capsys.readouterr().err
+    main([*command, "--cfa", "GBRG", "--black-level", "64", "--white-level", "1023"])
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["a.dng", "b.dng"]
+    assert read_raw(tmp_path / "out" / "a.dng").cfa == "GBRG"
 
 
 def test_a_large_preview_is_small(rng: np.random.Generator) -> None:
@@ -162,6 +204,8 @@ def test_what_ships_is_found_by_name_and_by_default(
     assert done.precision == "float16"
     assert abs(done.loss_db) < 0.01
     assert done.file.stat().st_size < 0.7 * network.stat().st_size
+    with pytest.raises(FsidError, match="overwritten"):
+        export(network, network)
     raw = noisy_raw()
     expected = denoise_raw(raw, load_model(network)).mosaic
     for model in (load_model(), load_model(model_module.DEFAULT_MODEL)):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -59,6 +60,7 @@ def test_a_file_that_does_not_fit_its_card_is_named(model_file: Path) -> None:
         load_denoiser(model_file)
     for change, message in (
         ({"net.intro.bias": torch.full((4,), torch.nan)}, "NaN"),
+        ({"net.intro.bias": torch.full((4,), 1e300, dtype=torch.double)}, "NaN or infinity"),
         ({"net.intro.bias": torch.zeros(5)}, r"\(5,\), expected \(4,\)"),
         ({"extra": torch.zeros(1)}, "unknown tensor extra"),
     ):
@@ -68,4 +70,52 @@ def test_a_file_that_does_not_fit_its_card_is_named(model_file: Path) -> None:
     del weights["net.intro.bias"]
     save_model(model_file, weights, CARD)
     with pytest.raises(FsidError, match=r"lacks tensor net\.intro\.bias"):
+        load_denoiser(model_file)
+
+
+def rewritten(model_file: Path, **changes: object) -> None:
+    """The model with another card: whatever `changes` say, at the top or of the network."""
+    card = json.loads(model_file.with_suffix(".json").read_text())
+    for key, value in changes.items():
+        (card["network"] if key in card["network"] else card)[key] = value
+    weights = RawDenoiser(CARD.network).state_dict()
+    save_file({n: t.contiguous() for n, t in weights.items()}, model_file, {"fsid_card": json.dumps(card)})
+
+
+@pytest.mark.parametrize(
+    ("lie", "message"),
+    [
+        ({"width": 4096}, "expected"),
+        ({"width": 10**12}, "width"),
+        ({"encoder_blocks": [1] * 9, "decoder_blocks": [1] * 9, "width": 4096}, "lacks"),
+        ({"encoder_blocks": [1] * 40, "decoder_blocks": [1] * 40}, "scales"),
+        ({"middle_blocks": 10**9}, "block"),
+        ({"patch_px": 0}, "patch_px 0"),
+        ({"patch_px": 10**9}, "patch_px"),
+        ({"conditioning": "magic"}, "conditioning"),
+        ({"network": [1]}, "network"),
+    ],
+)
+def test_a_card_that_lies_is_found_out_before_it_takes_memory(
+    model_file: Path, lie: dict[str, object], message: str
+) -> None:
+    """A network of width 4096 and nine scales has 10^14 parameters: building it would end the process."""
+    rewritten(model_file, **lie)
+    with pytest.raises(FsidError, match=rf"model\.safetensors: .*{message}"):
+        load_denoiser(model_file)
+
+
+@pytest.mark.parametrize("text", ["[1, 2]", "null", "[" * 200_000, "{", "3"])
+def test_a_card_that_is_none_is_named(model_file: Path, text: str) -> None:
+    weights = RawDenoiser(CARD.network).state_dict()
+    save_file({n: t.contiguous() for n, t in weights.items()}, model_file, {"fsid_card": text})
+    with pytest.raises(FsidError, match="not a JSON object"):
+        load_denoiser(model_file)
+
+
+@pytest.mark.parametrize("kind", [torch.int64, torch.bool, torch.complex64, torch.float8_e4m3fn])
+def test_weights_of_another_kind_of_number_are_refused(model_file: Path, kind: torch.dtype) -> None:
+    weights = {name: tensor.to(kind) for name, tensor in RawDenoiser(CARD.network).state_dict().items()}
+    save_model(model_file, weights, CARD)
+    with pytest.raises(FsidError, match="expected numbers of 16 to 64 bits"):
         load_denoiser(model_file)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +16,7 @@ onnx = pytest.importorskip("onnx")
 onnxruntime = pytest.importorskip("onnxruntime")
 
 from fsid.cli.main import main  # noqa: E402
+from fsid.config import to_plain  # noqa: E402
 from fsid.denoise import Denoiser, ModelCard, NetworkConfig, RawDenoiser, denoise_raw, save_model  # noqa: E402
 from fsid.denoise.onnx_denoiser import OnnxDenoiser, load_onnx, onnx_denoiser  # noqa: E402
 from fsid.denoise.onnx_export import onnx_bytes, onnx_model  # noqa: E402
@@ -135,3 +139,44 @@ def test_what_is_no_exported_network_is_named(tmp_path: Path) -> None:
     (tmp_path / "other.onnx").write_bytes(model.SerializeToString())
     with pytest.raises(FsidError, match=r"other\.onnx: is not a file of `fsid export`"):
         load_onnx(tmp_path / "other.onnx")
+
+
+def altered(graph: bytes, **notes: str) -> Any:
+    """The exported model with other metadata."""
+    model = onnx.load_from_string(graph)
+    onnx.helper.set_model_props(model, {p.key: p.value for p in model.metadata_props} | notes)
+    return model
+
+
+def test_metadata_that_lies_is_found_out(
+    rng: np.random.Generator, denoiser: Denoiser, exported: bytes, network: OnnxDenoiser
+) -> None:
+    for text in ("[1]", "null", "[" * 200_000, "{"):
+        with pytest.raises(FsidError, match="not a JSON object"):
+            onnx_denoiser(altered(exported, fsid_card=text).SerializeToString(), "lie")
+    raw = noisy_raw(rng, 64, 96)
+    lied = onnx_denoiser(altered(exported, multiple="0", receptive_radius="-9").SerializeToString(), "lie")
+    np.testing.assert_array_equal(
+        denoise_raw(raw, lied, tile_px=24).mosaic, denoise_raw(raw, network, tile_px=24).mosaic
+    )
+    smaller = json.dumps(to_plain(replace(denoiser.card, network=replace(NETWORK, middle_blocks=0))))
+    assert onnx_denoiser(altered(exported, fsid_card=smaller).SerializeToString(), "lie").receptive_radius < (
+        network.receptive_radius
+    )
+
+
+def test_a_graph_that_does_something_else_is_named(rng: np.random.Generator, exported: bytes) -> None:
+    """The right names and another meaning: `clean` is of another shape, or the graph stops midway."""
+    raw, model = noisy_raw(rng, 64, 96), altered(exported)
+    (last,) = (node for node in model.graph.node if "clean" in node.output)
+    last.output[0] = "hidden"
+    axes = onnx.numpy_helper.from_array(np.array([2, 3]), "axes")
+    model.graph.initializer.append(axes)
+    model.graph.node.append(onnx.helper.make_node("ReduceMean", ["hidden", "axes"], ["clean"], keepdims=1))
+    model.graph.output[0].type.tensor_type.ClearField("shape")
+    with pytest.raises(FsidError, match=r"lie: makes \(1, 4, 1, 1\)"):
+        denoise_raw(raw, onnx_denoiser(model.SerializeToString(), "lie"))
+    model.graph.node[-1].op_type = "Reshape"
+    model.graph.node[-1].ClearField("attribute")
+    with pytest.raises(FsidError, match="lie: onnxruntime cannot run it"):
+        denoise_raw(raw, onnx_denoiser(model.SerializeToString(), "lie"))

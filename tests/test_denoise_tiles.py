@@ -93,8 +93,14 @@ def test_bad_input_is_named(rng: np.random.Generator) -> None:
     noisy, model = raw(rng, 32, 32), denoiser()
     with pytest.raises(FsidError, match="noise level of this RAW is unknown"):
         denoise_raw(replace(noisy, noise=None), model)
-    with pytest.raises(FsidError, match="not negative"):
+    with pytest.raises(FsidError, match="0 to 1 is possible"):
         denoise_raw(noisy, model, NoiseLevel((-1e-3,) * 4, (0.0,) * 4))
+    with pytest.raises(FsidError, match="0 to 1 is possible"):
+        denoise_raw(noisy, model, NoiseLevel((1e30,) * 4, (0.0,) * 4))
+    with torch.no_grad():
+        (exploding := denoiser()).net.net.ending.weight.fill_(1e30)
+    with pytest.raises(FsidError, match="weights are broken"):
+        denoise_raw(noisy, exploding)
     broken = noisy.mosaic.copy()
     broken[3, 3] = np.nan
     with pytest.raises(FsidError, match="NaN"):

@@ -16,7 +16,7 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from safetensors.torch import load_file  # noqa: E402
+from safetensors.torch import load_file, save_file  # noqa: E402
 
 from fsid.config import load_settings, save_settings  # noqa: E402
 from fsid.dataset.shards import shard_path, write_shard  # noqa: E402
@@ -203,7 +203,16 @@ def test_bad_input_is_named(data: Path, tmp_path: Path) -> None:
     train(data, tmp_path / "run", replace(CONFIG, steps=2), quiet=True)
     with pytest.raises(FsidError, match="another steps, seed"):
         train(data, tmp_path / "run", replace(CONFIG, seed=1), quiet=True)
-    (tmp_path / "run" / "checkpoint.safetensors").write_bytes(b"broken")
+    checkpoint = tmp_path / "run" / "checkpoint.safetensors"
+    tensors, good = load_file(checkpoint), {"step": 1, "history": [], "validation": [], "pending": []}
+    for lie in ({"step": "x"}, {"step": 1.5}, {"history": 3}, {"history": [3]}, {"pending": [[1, 2, 3]]}):
+        save_file(tensors, checkpoint, {"progress": json.dumps(good | lie)})
+        with pytest.raises(FsidError, match=r"checkpoint\.safetensors: has no training progress"):
+            train(data, tmp_path / "run", replace(CONFIG, steps=2), quiet=True)
+    save_file(tensors, checkpoint, {"progress": "[" * 200_000})
+    with pytest.raises(FsidError, match=r"checkpoint\.safetensors: has no training progress"):
+        train(data, tmp_path / "run", replace(CONFIG, steps=2), quiet=True)
+    checkpoint.write_bytes(b"broken")
     with pytest.raises(FsidError, match=r"checkpoint\.safetensors"):
         train(data, tmp_path / "run", replace(CONFIG, steps=2), quiet=True)
     with pytest.raises(FsidError, match="learning_rate"):

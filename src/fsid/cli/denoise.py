@@ -36,16 +36,16 @@ def denoise(
     of a profile, or else estimated from the image.
 
     Args:
-        input: DNG or any other Bayer RAW that LibRaw opens; a folder of them; or a bare mosaic (.npy, 16-bit
-            .png or .tif, .raw or .bin of 16-bit little-endian values), given --cfa, --black-level and
-            --white-level.
-        output: DNG file to write; a folder where the input is one.
+        input: DNG or any other Bayer RAW that LibRaw opens; or a bare mosaic (.npy, 16-bit .png or .tif, .raw
+            or .bin of 16-bit little-endian values), given --cfa, --black-level and --white-level; or a folder
+            of either.
+        output: DNG file to write, another than the input; a folder where the input is one.
         model: Folder of a training (fsid train), its model.safetensors, a file of fsid export (.onnx or
             .safetensors), or the name of a shipped network; by default the shipped one.
         profile: Noise profile, a built-in name (fsid profiles) or a file; by default the file's own noise.
         iso: ISO of the profile's level; by default the file's.
         strength: 0 to 1: share of the noise's amplitude to remove (1 all of it, less leaves grain). Above 1:
-            take the noise for that many times as strong, which smooths more.
+            take the noise for that many times as strong, which smooths more (at most 100).
         backend: What runs the network: torch (on a GPU where there is one) or onnx (onnxruntime, on the CPU);
             by default onnx for an .onnx file, else torch.
         cfa: Colours of a bare mosaic's first 2x2 pixels, read row by row: RGGB, BGGR, GRBG or GBRG.
@@ -58,7 +58,7 @@ def denoise(
     from fsid.denoise import denoise_file, denoise_folder, find_raws, load_model
 
     layout = _layout(cfa, black_level, white_level, width, height)
-    sources = find_raws(input) if input.is_dir() else None
+    sources = find_raws(input, bare=layout is not None) if input.is_dir() else None
     network = load_model(model, backend)
     console = Console(stderr=True)
     with progress_bar("denoising", "tiles" if sources is None else "files", quiet=quiet) as progress:

@@ -16,6 +16,7 @@ from pathlib import Path
 import torch
 from torch import Tensor, nn
 
+from fsid.config import from_plain
 from fsid.denoise.model import check_weights, read_tensors, write_tensors
 from fsid.errors import FsidError
 
@@ -87,17 +88,7 @@ def load_checkpoint(run_dir: Path, net: nn.Module, optimizer: torch.optim.Optimi
     if not path.exists():
         return TrainState.start(net)
     tensors, header = read_tensors(path, "a checkpoint of `fsid train`")
-    try:
-        progress = json.loads(header["progress"])
-        state = TrainState(
-            progress["step"],
-            {},
-            progress["history"],
-            progress["validation"],
-            [(a, b) for a, b in progress["pending"]],
-        )
-    except (KeyError, ValueError, TypeError):
-        raise FsidError(f"{path}: has no training progress in its header; delete it to start again") from None
+    state = _progress(header, path)
     weights = _part(tensors, "weight.")
     check_weights(net, weights, path)
     net.load_state_dict(weights)
@@ -108,6 +99,27 @@ def load_checkpoint(run_dir: Path, net: nn.Module, optimizer: torch.optim.Optimi
         _copy({moment: tensors.get(f"{moment}.{name}", torch.empty(0)) for moment in _MOMENTS}, moments, path)
         optimizer.state[parameter] = {"step": torch.tensor(float(state.step)), **moments}
     return state
+
+
+@dataclass(frozen=True)
+class _Progress:
+    """What the header must hold; see `TrainState`."""
+
+    step: int
+    history: list[dict[str, float]]
+    validation: list[dict[str, float]]
+    pending: list[tuple[float, float]]
+
+
+def _progress(header: Mapping[str, str], path: Path) -> TrainState:
+    """The state in a checkpoint's header, without its average; rows are not converted: 5 stays 5, not 5.0."""
+    try:
+        plain = json.loads(header["progress"])
+        from_plain(_Progress, dict(plain), source=str(path))
+    except (KeyError, ValueError, TypeError, RecursionError, FsidError):
+        raise FsidError(f"{path}: has no training progress in its header; delete it to start again") from None
+    pending = [(loss, psnr) for loss, psnr in plain["pending"]]
+    return TrainState(plain["step"], {}, plain["history"], plain["validation"], pending)
 
 
 def _part(tensors: Mapping[str, Tensor], prefix: str) -> dict[str, Tensor]:

@@ -27,6 +27,7 @@ from fsid.errors import FsidError
 from fsid.sensor.mosaic import pack, site_offsets, unpack
 from fsid.sensor.raw import NoiseLevel, Raw
 
+MAX_STRENGTH = 100.0
 TILE_PX = 512  # packed pixels: some 500 MB of activations for the small networks
 _POOLING_PATCHES = 16
 _WHOLE_UP_TO = 2  # image sides, in training patches, up to which it is pooled as a whole
@@ -66,7 +67,8 @@ def denoise_raw(
     is removed, so that grain is left below 1; above 1 the noise is taken to be that many times as strong,
     which smooths more. tile_px: side of a tile in packed pixels, overlap excluded; memory grows with it, the
     result does not depend on it. progress(done, tiles) is called after each tile. Raises FsidError where the
-    noise level is unknown or not physical, the strength negative, or the mosaic holds NaN or infinity.
+    noise level is unknown or not physical, the strength below 0 or above `MAX_STRENGTH`, the mosaic holds NaN
+    or infinity, or the network makes such.
     """
     level = level if level is not None else raw.noise
     _check(raw, level, strength, tile_px)
@@ -99,12 +101,16 @@ def _check(raw: Raw, level: NoiseLevel | None, strength: float, tile_px: int) ->
         raise FsidError(
             "the noise level of this RAW is unknown: give a profile and an ISO (--profile, --iso)"
         )
-    if not np.all(np.isfinite((level.k, level.sigma2))) or min(*level.k, *level.sigma2) < 0:
-        raise FsidError(f"noise level {level}: k and sigma2 must be finite and not negative")
+    if not all(0 <= variance <= 1 for variance in (*level.k, *level.sigma2)):
+        raise FsidError(
+            f"noise level {level}: k and sigma2 are variances in units of the white level; 0 to 1 is possible"
+        )
     if not np.all(np.isfinite(raw.mosaic)):
         raise FsidError("this RAW holds NaN or infinity; read it again from its file")
-    if not 0 <= strength < np.inf:
-        raise FsidError(f"strength {strength}: must be 0 (nothing is removed) or more; 1 removes the noise")
+    if not 0 <= strength <= MAX_STRENGTH:
+        raise FsidError(
+            f"strength {strength}: must be 0 (nothing is removed) to {MAX_STRENGTH:g}; 1 removes the noise"
+        )
     if tile_px < 1:
         raise FsidError(f"tile_px {tile_px}: must be at least 1")
 
@@ -121,6 +127,8 @@ def _denoise_packed(
     averages = np.mean([model.averages(patch, level) for patch in patches], axis=0)
     for done, (row, column) in enumerate((r, c) for r in rows for c in columns):
         clean = model.run(np.ascontiguousarray(packed[:, row.seen, column.seen]), level, averages)
+        if not np.all(np.isfinite(clean)):
+            raise FsidError("the network makes NaN or infinity of this image: its weights are broken")
         out[:, row.kept, column.kept] = clean[:, row.inside, column.inside]
         if progress is not None:
             progress(done + 1, len(rows) * len(columns))

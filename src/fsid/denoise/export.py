@@ -47,7 +47,8 @@ def export(run: str | Path | None, file: Path, precision: Precision | None = Non
     """Write the network of `run` (see `load_model`) to `file`, .onnx or .safetensors.
 
     precision: None is float32 for .onnx, and for .safetensors float16 where that costs less than
-    `HALF_LIMIT_DB`. FsidError: no such network, another suffix or precision, a result that does not agree.
+    `HALF_LIMIT_DB`. FsidError: no such network, another suffix or precision, the network itself as `file`, a
+    result that does not agree.
     """
     path = model_path(run)
     suffix = file.suffix.lower()
@@ -55,6 +56,8 @@ def export(run: str | Path | None, file: Path, precision: Precision | None = Non
         raise FsidError(f"{file}: a network is exported as .onnx or .safetensors")
     if suffix == ".safetensors" and precision == "int8":
         raise FsidError("int8: is for .onnx; .safetensors holds float32 or float16")
+    if file.resolve() == path.resolve():
+        raise FsidError(f"{file}: is the network itself, which would be overwritten; give another name")
     if not file.parent.is_dir():
         raise FsidError(f"{file.parent}: no such folder")
     denoiser = load_denoiser(path)

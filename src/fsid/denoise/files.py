@@ -38,13 +38,18 @@ class Noise:
     source: str
 
 
-def find_raws(folder: Path) -> list[Path]:
-    """The RAW files directly inside `folder`, sorted by name; FsidError where there is none."""
+def find_raws(folder: Path, *, bare: bool = False) -> list[Path]:
+    """The RAW files directly inside `folder`, sorted by name; FsidError where there is none.
+
+    bare: those of bare mosaics instead, which a `Layout` is given for.
+    """
     if not folder.is_dir():
         raise FsidError(f"{folder}: is not a folder of RAW files")
-    raws = sorted(path for path in folder.iterdir() if path.suffix.lower() in RAW_SUFFIXES)
+    suffixes = BARE_SUFFIXES if bare else sorted(RAW_SUFFIXES)
+    raws = sorted(path for path in folder.iterdir() if path.suffix.lower() in suffixes)
     if not raws:
-        raise FsidError(f"{folder}: holds no RAW file ({', '.join(sorted(RAW_SUFFIXES))})")
+        what = "bare mosaic" if bare else "RAW file"
+        raise FsidError(f"{folder}: holds no {what} ({', '.join(suffixes)})")
     return raws
 
 
@@ -53,8 +58,9 @@ def read_input(path: Path, layout: Layout | None) -> Raw:
     if layout is not None:
         return layout.read(path)
     if path.suffix.lower() in BARE_SUFFIXES:
+        size = " --width PX --height PX" if path.suffix.lower() in (".raw", ".bin") else ""
         raise FsidError(
-            f"{path}: is a bare mosaic, say what it holds: --cfa RGGB --black-level DN --white-level DN"
+            f"{path}: is a bare mosaic, say what it holds: --cfa RGGB --black-level DN --white-level DN{size}"
         )
     return read_raw(path)
 
@@ -64,7 +70,7 @@ def noise_of(raw: Raw, profile: str | None, iso: float | None, path: Path) -> No
     if profile is not None:
         iso = iso if iso is not None else raw.iso
         if not iso > 0:
-            raise FsidError(f"{path}: its ISO is unknown, give --iso")
+            raise FsidError(f"{path}: its ISO is unknown, give --iso with a number above 0")
         return Noise(load_profile(profile).level(iso), f"profile {profile} at ISO {iso:g}")
     if iso is not None:
         raise FsidError("--iso: names a level of a camera; give --profile too (fsid profiles lists them)")
@@ -92,15 +98,23 @@ def denoise_file(
 ) -> Noise:
     """Denoise one RAW file into a DNG with finer levels (a denoised value is no whole DN) and a preview.
 
-    The noise level that was used is returned. FsidError: `denoise_raw`, unreadable input, another suffix.
+    The noise level that was used is returned. FsidError: `denoise_raw`, unreadable input, another suffix, a
+    folder that is not there, and `source` as `target`: an original cannot be made again.
     """
     if target.suffix.lower() != ".dng":
         raise FsidError(f"{target}: a denoised RAW is written as .dng")
+    if not target.parent.is_dir():
+        raise FsidError(f"{target.parent}: no such folder; make it first")
+    if target.resolve() == source.resolve():
+        raise FsidError(f"{target}: is the original, which would be overwritten; give another name")
     raw = read_input(source, layout)
     noise = noise_of(raw, profile, iso, source)
     if iso is not None:
         raw = replace(raw, iso=iso)
-    clean = denoise_raw(raw, model, noise.level, strength=strength, progress=progress)
+    try:
+        clean = denoise_raw(raw, model, noise.level, strength=strength, progress=progress)
+    except FsidError as error:
+        raise FsidError(f"{source}: {error}") from None
     write_dng(target, clean_levels(clean), preview_of(clean))
     return noise
 
@@ -124,15 +138,15 @@ def denoise_folder(
     names = [source.stem for source in sources]
     if twice := sorted({name for name in names if names.count(name) > 1}):
         raise FsidError(f"{sources[0].parent}: several files would become {twice[0]}.dng; rename one")
+    targets = [target / f"{name}.dng" for name in names]
+    if {path.resolve() for path in targets} & {path.resolve() for path in sources}:
+        raise FsidError(f"{target}: is the folder of the originals, which would be overwritten")
     try:
         target.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise FsidError(f"{target}: cannot be written ({error.strerror})") from None
     failures = 0
-    for done, source in enumerate(sources):
-        out = target / f"{source.stem}.dng"
-        if out.resolve() == source.resolve():
-            raise FsidError(f"{target}: is the folder of the originals, which would be overwritten")
+    for done, (source, out) in enumerate(zip(sources, targets, strict=True)):
         try:
             denoise_file(source, out, model, profile=profile, iso=iso, strength=strength, layout=layout)
         except FsidError as error:

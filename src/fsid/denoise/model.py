@@ -22,7 +22,7 @@ from torch import Tensor
 
 from fsid.config import from_plain, to_plain
 from fsid.denoise.nafnet import NAFBlock, frozen_pooling, pooling
-from fsid.denoise.raw_denoiser import NetworkConfig, RawDenoiser
+from fsid.denoise.raw_denoiser import MAX_PATCH_PX, NetworkConfig, RawDenoiser
 from fsid.errors import FsidError
 from fsid.files import write_atomically
 from fsid.sensor import NoiseLevel
@@ -31,6 +31,7 @@ MODEL_FILE = "model.safetensors"  # inside a run folder
 WEIGHTS = Path(str(files("fsid.denoise"))) / "weights"  # what ships: NAME.safetensors and its card, NAME.json
 DEFAULT_MODEL = "nafnet-small"
 _CARD = "fsid_card"
+_STORED = (torch.float16, torch.bfloat16, torch.float32, torch.float64)
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,10 @@ class ModelCard:
     patch_px: int
     training: str = ""
     details: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.patch_px <= MAX_PATCH_PX:
+            raise FsidError(f"patch_px {self.patch_px}: must be 1 to {MAX_PATCH_PX}")
 
 
 @dataclass(frozen=True)
@@ -128,16 +133,24 @@ def load_denoiser(run_or_file: str | Path | None = None, device: str | torch.dev
     )
     if _CARD not in header:
         raise FsidError(f"{path}: has no FSID model card; give a model that `fsid train` wrote")
-    try:
-        plain = json.loads(header[_CARD])
-    except ValueError:
-        raise FsidError(f"{path}: its model card is not valid JSON; copy the model again") from None
-    card = from_plain(ModelCard, plain, source=str(path))
+    card = parse_card(header[_CARD], str(path))
+    with torch.device("meta"):  # takes no memory, of which a card that lies may ask for any amount
+        check_weights(RawDenoiser(card.network), weights, path)
     net = RawDenoiser(card.network)
-    check_weights(net, weights, path)
     net.load_state_dict(weights)
     target = torch.device(device)
     return Denoiser(net.to(target).eval().requires_grad_(False), card, target)
+
+
+def parse_card(text: str, source: str) -> ModelCard:
+    """The card in a file's header; FsidError, naming `source`, where it is none."""
+    try:
+        plain = json.loads(text)
+    except (ValueError, RecursionError):
+        plain = None
+    if not isinstance(plain, dict):
+        raise FsidError(f"{source}: its model card is not a JSON object; copy the model again")
+    return from_plain(ModelCard, plain, source=source)
 
 
 def check_weights(net: torch.nn.Module, weights: Mapping[str, Tensor], path: Path) -> None:
@@ -153,7 +166,9 @@ def check_weights(net: torch.nn.Module, weights: Mapping[str, Tensor], path: Pat
             raise FsidError(
                 f"{path}: tensor {name} is {tuple(tensor.shape)}, expected {tuple(expected[name].shape)}"
             )
-        if not torch.isfinite(tensor).all():
+        if tensor.dtype not in _STORED:
+            raise FsidError(f"{path}: tensor {name} holds {tensor.dtype}; expected numbers of 16 to 64 bits")
+        if not torch.isfinite(tensor.float()).all():
             raise FsidError(f"{path}: tensor {name} holds NaN or infinity; train again")
 
 

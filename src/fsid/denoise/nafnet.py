@@ -117,7 +117,7 @@ class NAFNet(nn.Module):
             width //= 2
             self.decoders.append(nn.Sequential(*[NAFBlock(width) for _ in range(blocks)]))
         self.multiple = 2 ** len(encoder_blocks)
-        self.receptive_radius = _receptive_radius(encoder_blocks, middle_blocks, decoder_blocks)
+        self.receptive_radius = receptive_radius(encoder_blocks, middle_blocks, decoder_blocks)
 
     def forward(self, image: Tensor) -> Tensor:
         """(B, in_channels, H, W) -> (B, out_channels, H, W)."""
@@ -135,7 +135,7 @@ class NAFNet(nn.Module):
         return (self.ending(x) + padded[:, : self.out_channels])[..., :height, :width]
 
 
-def _receptive_radius(encoder: tuple[int, ...], middle: int, decoder: tuple[int, ...]) -> int:
+def receptive_radius(encoder: tuple[int, ...], middle: int, decoder: tuple[int, ...]) -> int:
     """Pixels beyond which an output cannot depend on an input, `sca` aside.
 
     A block reaches 1 cell of its scale. Reach r at one scale is 2 r + 1 at the next finer one, because a

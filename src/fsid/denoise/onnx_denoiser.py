@@ -3,24 +3,26 @@
     averages(patch) = graph(patch)["averages_out"]
     run(tile, averages) = graph(tile, averages, frozen = 1)["clean"]
 
-See `onnx_export` for the graph. What the tiles need to know (stride, reach, patch size) is in its metadata.
+See `onnx_export` for the graph. What the tiles need to know (stride, reach, patch size) follows from the card
+in its metadata.
 """
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from fsid.config import from_plain
-from fsid.denoise.model import ModelCard
+from fsid.denoise.model import ModelCard, parse_card
+from fsid.denoise.nafnet import receptive_radius
 from fsid.errors import FsidError
 from fsid.sensor import NoiseLevel
 
-CARD_KEY, MULTIPLE_KEY, RADIUS_KEY = "fsid_card", "multiple", "receptive_radius"
+CARD_KEY = "fsid_card"
+INPUTS = {"noisy", "k", "sigma2", "averages", "frozen"}
+OUTPUTS = {"clean", "averages_out"}
 
 
 @dataclass(frozen=True)
@@ -29,17 +31,36 @@ class OnnxDenoiser:
 
     session: Any
     card: ModelCard
-    multiple: int
-    receptive_radius: int
+    source: str
+
+    @property
+    def multiple(self) -> int:
+        """See `Denoiser`; it follows from the card, as the next one does."""
+        return 2 ** len(self.card.network.encoder_blocks)
+
+    @property
+    def receptive_radius(self) -> int:
+        """See `Denoiser`."""
+        network = self.card.network
+        return receptive_radius(network.encoder_blocks, network.middle_blocks, network.decoder_blocks)
 
     def averages(self, patch: np.ndarray, level: NoiseLevel) -> np.ndarray:
         """The averages that channel attention takes over `patch` (4, h, w): (n,)."""
-        return self.session.run(["averages_out"], inputs(patch, level))[0]
+        return self._run("averages_out", inputs(patch, level))
 
     def run(self, tile: np.ndarray, level: NoiseLevel, averages: np.ndarray) -> np.ndarray:
         """The clean estimate (4, h, w) of `tile` with channel attention held at `averages` (n,)."""
         frozen = {"averages": averages.astype(np.float32), "frozen": np.ones((), np.float32)}
-        return self.session.run(["clean"], inputs(tile, level) | frozen)[0][0]
+        clean = self._run("clean", inputs(tile, level) | frozen)
+        if clean.shape != (1, *tile.shape):
+            raise FsidError(f"{self.source}: makes {clean.shape} of {(1, *tile.shape)}; export it again")
+        return clean[0]
+
+    def _run(self, output: str, feed: dict[str, np.ndarray]) -> np.ndarray:
+        try:
+            return self.session.run([output], feed)[0]
+        except Exception as error:  # onnxruntime has a class of its own per reason, and no common one
+            raise FsidError(f"{self.source}: onnxruntime cannot run it ({_line(error)})") from None
 
 
 def load_onnx(file: Path) -> OnnxDenoiser:
@@ -60,15 +81,17 @@ def onnx_denoiser(graph: bytes, source: str, *, threads: int = 0) -> OnnxDenoise
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
     try:
         session = onnxruntime.InferenceSession(graph, options, providers=["CPUExecutionProvider"])
-    except Exception as error:  # onnxruntime has an exception class of its own per reason, and no common one
-        reason = " ".join(str(error).split())
-        raise FsidError(f"{source}: is not a network that onnxruntime can read ({reason})") from None
-    notes = session.get_modelmeta().custom_metadata_map
-    try:
-        card = from_plain(ModelCard, json.loads(notes[CARD_KEY]), source=source)
-        return OnnxDenoiser(session, card, int(notes[MULTIPLE_KEY]), int(notes[RADIUS_KEY]))
-    except (KeyError, ValueError):
-        raise FsidError(f"{source}: is not a file of `fsid export`") from None
+    except Exception as error:  # see `OnnxDenoiser._run`
+        raise FsidError(f"{source}: is not a network that onnxruntime can read ({_line(error)})") from None
+    text = session.get_modelmeta().custom_metadata_map.get(CARD_KEY)
+    given = {value.name for value in (*session.get_inputs(), *session.get_overridable_initializers())}
+    if text is None or given != INPUTS or {value.name for value in session.get_outputs()} != OUTPUTS:
+        raise FsidError(f"{source}: is not a file of `fsid export`")
+    return OnnxDenoiser(session, parse_card(text, source), source)
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split())
 
 
 def inputs(packed: np.ndarray, level: NoiseLevel) -> dict[str, np.ndarray]:

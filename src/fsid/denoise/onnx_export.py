@@ -26,7 +26,7 @@ from torch import Tensor, nn
 from fsid.config import to_plain
 from fsid.denoise.model import Denoiser
 from fsid.denoise.nafnet import SpatialMean, spatial_means
-from fsid.denoise.onnx_denoiser import CARD_KEY, MULTIPLE_KEY, RADIUS_KEY
+from fsid.denoise.onnx_denoiser import CARD_KEY
 
 OPSET = 18
 _EXAMPLE_PX = 64
@@ -139,8 +139,8 @@ def _described(model: Any, denoiser: Denoiser) -> Any:
     model.producer_name, model.doc_string = "fsid", DESCRIPTION
     notes = {
         CARD_KEY: json.dumps(to_plain(denoiser.card)),
-        MULTIPLE_KEY: str(denoiser.multiple),
-        RADIUS_KEY: str(denoiser.receptive_radius),
+        "multiple": str(denoiser.multiple),
+        "receptive_radius": str(denoiser.receptive_radius),
         "patch_px": str(denoiser.card.patch_px),
         "description": DESCRIPTION,
     }

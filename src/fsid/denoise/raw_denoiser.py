@@ -22,6 +22,8 @@ from fsid.denoise.nafnet import NAFNet
 from fsid.errors import FsidError
 
 SITES = 4
+MAX_PATCH_PX = 2048
+MAX_WIDTH, MAX_SCALES, MAX_BLOCKS = 4096, 10, 1000  # a card that asks for more lies: NAFNet-64 has 36 blocks
 
 
 @dataclass(frozen=True)
@@ -38,8 +40,12 @@ class NetworkConfig:
         if len(self.encoder_blocks) != len(self.decoder_blocks):
             raise FsidError("encoder_blocks and decoder_blocks: give equally many scales")
         blocks = (*self.encoder_blocks, self.middle_blocks, *self.decoder_blocks)
-        if self.width < 1 or min(blocks) < 0:
-            raise FsidError("width must be at least 1 and block counts at least 0")
+        if not 1 <= self.width <= MAX_WIDTH:
+            raise FsidError(f"width {self.width}: must be 1 to {MAX_WIDTH}")
+        if min(blocks) < 0 or sum(blocks) > MAX_BLOCKS or len(self.encoder_blocks) > MAX_SCALES:
+            raise FsidError(
+                f"block counts must not be negative, of at most {MAX_SCALES} scales and {MAX_BLOCKS} in all"
+            )
 
 
 class RawDenoiser(nn.Module):

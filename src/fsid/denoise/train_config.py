@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Literal
 
 from fsid.config import load_settings
-from fsid.denoise.raw_denoiser import NetworkConfig
+from fsid.denoise.raw_denoiser import MAX_PATCH_PX, NetworkConfig
 from fsid.errors import FsidError
 
 
@@ -58,6 +58,8 @@ class TrainConfig:
         for key in ("steps", "batch", "patch_px", "log_every", "checkpoint_every", "validate_every"):
             if getattr(self, key) < 1:
                 raise FsidError(f"{key}: must be at least 1, got {getattr(self, key)}")
+        if self.patch_px > MAX_PATCH_PX:
+            raise FsidError(f"patch_px: must be at most {MAX_PATCH_PX}, got {self.patch_px}")
         for key in ("learning_rate", "clip_norm"):
             if not getattr(self, key) > 0:
                 raise FsidError(f"{key}: must be above 0, got {getattr(self, key)}")
