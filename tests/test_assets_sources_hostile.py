@@ -133,6 +133,8 @@ BYTES = {
     "flat.obj": b"v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n",
     "nan.obj": b"v nan 0 0\nv 1 nan 0\nv inf 1 0\nf 1 2 3\n",
     "giant.obj": b"v 0 0 0\nv 1e300 0 0\nv 0 1e300 0\nf 1 2 3\n",
+    "materials.obj": b"v 0 0 0\nv 1 0 0\nv 0 1 0\n"
+    + b"".join(b"usemtl m%d\nf 1 2 3\n" % i for i in range(50_000)),
     "noise.glb": b"glTF" + bytes(range(256)) * 10,
     "long_chunk.glb": glb(2**32 - 1),
     "cut.glb": GOOD.export(file_type="glb")[:300],

@@ -18,6 +18,9 @@ MAX_CATALOGUE_BYTES = 16 * 2**20
 MAX_TRIANGLES = 4_000_000
 """As read. What is kept is `cleaning.KEPT_TRIANGLES`."""
 
+MAX_PARTS = 5_000
+"""Materials of an OBJ; its reader's time grows with their square."""
+
 MAX_NODES = 5_000
 MAX_DEPTH = 200
 """Of a glTF scene graph."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from fsid.assets.sources.cleaning import Triangles
 from fsid.assets.sources.gltf_file import Fetch, plain_gltf
-from fsid.assets.sources.limits import MAX_FILE_BYTES, MAX_TRIANGLES, RefusedError
+from fsid.assets.sources.limits import MAX_FILE_BYTES, MAX_PARTS, MAX_TRIANGLES, RefusedError
 
 MESH_SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl")
 
@@ -64,6 +64,8 @@ def _geometries(data: bytes, suffix: str, fetch: Fetch) -> list[tuple[str, np.nd
 def _named_materials(data: bytes) -> tuple[bytes, dict[str, bytes]]:
     """An OBJ that names its materials from a list made here: the file's own .mtl is never opened."""
     names = sorted(set(re.findall(rb"^usemtl[ \t]+(\S[^\r\n]*?)[ \t]*\r?$", data, re.MULTILINE)))
+    if len(names) > MAX_PARTS:
+        raise RefusedError(f"{len(names):,} materials")
     body = re.sub(rb"^mtllib[^\n]*$", b"", data, flags=re.MULTILINE)
     library = b"".join(b"newmtl " + name + b"\n" for name in [*names, b"unused"])  # one alone is ignored
     return b"mtllib names\n" + body, {"names": library}
