@@ -76,6 +76,29 @@ def test_every_format_gives_the_same_solid(tmp_path: Path, suffix: str):
     assert len(mesh.vertices) == 24, "hard edges are kept"
 
 
+SPELLINGS = {
+    "tabs": lambda text: text.replace(b" ", b"\t"),
+    "indented": lambda text: text.replace(b"\nf ", b"\n  f ").replace(b"\nv ", b"\n v "),
+    "byte order mark": lambda text: b"\xef\xbb\xbf" + text,
+    "Windows lines": lambda text: text.replace(b"\n", b"\r\n"),
+    "old Macintosh lines": lambda text: text.replace(b"\n", b"\r"),
+    "blanks at the ends": lambda text: text.replace(b"\n", b"  \n"),
+    "other letters": lambda text: b"# caf\xe9\n" + text,
+}
+"""The same OBJ as different programs write it."""
+
+
+@pytest.mark.parametrize("spelling", SPELLINGS)
+def test_an_obj_may_be_spelled_in_any_way(tmp_path: Path, spelling: str):
+    plain = cube_obj().encode()
+    (tmp_path / "plain.obj").write_bytes(plain)
+    (tmp_path / "other.obj").write_bytes(SPELLINGS[spelling](plain))
+    other, one = (build_mesh(name, 0) for name in mesh_sources(tmp_path))
+    np.testing.assert_array_equal(other.vertices, one.vertices)
+    np.testing.assert_array_equal(other.faces, one.faces)
+    assert other.part_names == one.part_names
+
+
 def test_normals_are_smooth_where_the_shape_is_and_hard_where_it_is_not():
     mesh = clean(triangles_of(trimesh.creation.cylinder(radius=0.1, height=0.4, sections=48), "part"))
     side = np.abs(mesh.normals[:, 2]) < 0.5

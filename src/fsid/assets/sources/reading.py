@@ -46,7 +46,7 @@ def _geometries(data: bytes, suffix: str, fetch: Fetch) -> list[tuple[str, np.nd
         data, resolver = plain_gltf(data, fetch)
         suffix = ".gltf"
     elif suffix == ".obj":
-        data, resolver = _named_materials(data)
+        data, resolver = _named_materials(_plain_lines(data))
     elif suffix == ".ply":
         _check_ply(data)
     loaded = trimesh.load_scene(io.BytesIO(data), suffix[1:], resolver=resolver, process=False)
@@ -61,9 +61,16 @@ def _geometries(data: bytes, suffix: str, fetch: Fetch) -> list[tuple[str, np.nd
     return pieces
 
 
+def _plain_lines(data: bytes) -> bytes:
+    """OBJ text with blanks in place of tabs, one line feed at every end of a line, and without byte order
+    mark or indentation: the format allows them, the reader does not."""
+    text = data.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    return re.sub(rb"^ +", b"", text.replace(b"\t", b" "), flags=re.MULTILINE)
+
+
 def _named_materials(data: bytes) -> tuple[bytes, dict[str, bytes]]:
     """An OBJ that names its materials from a list made here: the file's own .mtl is never opened."""
-    names = sorted(set(re.findall(rb"^usemtl[ \t]+(\S[^\r\n]*?)[ \t]*\r?$", data, re.MULTILINE)))
+    names = sorted(set(re.findall(rb"^usemtl +(\S[^\n]*?) *$", data, re.MULTILINE)))
     if len(names) > MAX_PARTS:
         raise RefusedError(f"{len(names):,} materials")
     body = re.sub(rb"^mtllib[^\n]*$", b"", data, flags=re.MULTILINE)
