@@ -99,19 +99,31 @@ def test_training_denoises(data: Path, tmp_path: Path) -> None:
     assert psnrs[-1] > psnrs[0]
 
 
-def test_a_killed_training_ends_with_the_same_bits(data: Path, tmp_path: Path) -> None:
-    undisturbed = train(data, tmp_path / "a", CONFIG, quiet=True)
-    arguments = [str(data), str(tmp_path / "b"), str(tmp_path / "a" / "config.yaml")]
+def test_a_killed_training_ends_with_the_same_bits(tmp_path: Path) -> None:
+    """Killed at step 5: after a validation at 3 that wrote the best network, and a checkpoint at 4."""
+    folder, rng = tmp_path / "data", np.random.default_rng(4)
+    folder.mkdir()
+    write_shard(shard_path(folder, 0), [stored(rng, number) for number in range(5)])
+    config = replace(CONFIG, held_out=1, validate_every=3)
+    undisturbed = train(folder, tmp_path / "a", config, quiet=True)
+    arguments = [str(folder), str(tmp_path / "b"), str(tmp_path / "a" / "config.yaml")]
     killed = subprocess.run([sys.executable, "-c", KILLED_TRAINING, *arguments], check=False)
     assert killed.returncode == -signal.SIGKILL
-    assert not (tmp_path / "b" / "model.safetensors").exists()
-    resumed = train(data, tmp_path / "b", CONFIG, resume=True, quiet=True)
-    assert resumed.read_bytes() == undisturbed.read_bytes()
-    for name in ("checkpoint.safetensors", "history.json"):
+    assert not (tmp_path / "b" / "last.safetensors").exists()
+    resumed = train(folder, tmp_path / "b", config, resume=True, quiet=True)
+    assert [row["step"] for row in json.loads((tmp_path / "b" / "validation.json").read_text())] == [3, 6, 8]
+    for name in (
+        "model.safetensors",
+        "last.safetensors",
+        "checkpoint.safetensors",
+        "history.json",
+        "validation.json",
+    ):
         assert (tmp_path / "b" / name).read_bytes() == (tmp_path / "a" / name).read_bytes()
-    weights = load_file(undisturbed)
+    weights = load_file(tmp_path / "a" / "last.safetensors")
     assert not torch.equal(weights["net.intro.weight"], torch.zeros_like(weights["net.intro.weight"]))
-    assert train(data, tmp_path / "b", CONFIG, quiet=True).read_bytes() == undisturbed.read_bytes()
+    assert train(folder, tmp_path / "b", config, quiet=True).read_bytes() == undisturbed.read_bytes()
+    assert resumed == tmp_path / "b" / "model.safetensors"
 
 
 def test_two_processes_train_one_network(data: Path, tmp_path: Path) -> None:
