@@ -35,11 +35,14 @@ def test_the_guide_lists_what_the_registry_has():
     assert (REPOSITORY / "docs" / "materials.md").read_text(encoding="utf-8") == tool["guide"]()
 
 
-NAMED = """wood_planks parquet burl plywood brushed_metal scratched_metal cast_metal rusty_metal anodised_metal
-hammered_metal weave satin knit corduroy denim felt lace tartan embroidery carpet thread_spools leather suede plastic
-glossy_plastic translucent_plastic granite slate sandstone marble terrazzo concrete brick tiles plaster wallpaper paper
-cardboard printed_text tables barcodes test_chart resolution_chart colour_chart guilloche halftone magazine screen
-leaves bark grass gravel sand fur water bread cheese salad skin"""
+NAMED = """
+wood_planks parquet burl plywood brushed_metal scratched_metal cast_metal rusty_metal anodised_metal
+hammered_metal weave satin knit corduroy denim felt lace tartan embroidery carpet thread_spools leather
+suede plastic glossy_plastic translucent_plastic granite slate sandstone marble terrazzo concrete brick
+tiles plaster wallpaper paper cardboard printed_text tables barcodes test_chart resolution_chart
+colour_chart guilloche halftone magazine screen leaves bark grass gravel sand fur water bread cheese salad
+skin
+"""
 """What a household, a print shop and a garden need at the least."""
 
 
