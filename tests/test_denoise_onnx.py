@@ -81,6 +81,57 @@ def test_the_graph_alone_is_enough(rng: np.random.Generator, denoiser: Denoiser,
     assert notes["patch_px"] == "16"
 
 
+def as_described(graph: bytes, raw: Raw, tile: int) -> np.ndarray:
+    """The file's `description`, line by line, with NumPy and onnxruntime alone."""
+    session = onnxruntime.InferenceSession(graph, providers=["CPUExecutionProvider"])
+    notes = session.get_modelmeta().custom_metadata_map
+    multiple, radius, patch = (int(notes[key]) for key in ("multiple", "receptive_radius", "patch_px"))
+    assert raw.noise is not None
+    level = {"k": np.array([raw.noise.k], "f4"), "sigma2": np.array([raw.noise.sigma2], "f4")}
+    top, left = divmod(raw.cfa.index("R"), 2)
+    height, width = raw.mosaic.shape
+    below, beyond = -(height + top) % (2 * multiple), -(width + left) % (2 * multiple)
+    x = np.pad(raw.mosaic, ((top, below), (left, beyond)), mode="reflect")
+    planes = np.stack([x[0::2, 0::2], x[0::2, 1::2], x[1::2, 0::2], x[1::2, 1::2]])[None]
+    rows, columns = planes.shape[2:]
+    if max(rows, columns) <= 2 * patch:
+        (clean,) = session.run(["clean"], {"noisy": planes, **level})
+    else:
+        starts = []
+        for side, count in (
+            (rows, round(4 * (rows / columns) ** 0.5)),
+            (columns, round(4 * (columns / rows) ** 0.5)),
+        ):
+            count = max(1, count)
+            starts.append([round(max(side - patch, 0) * (i + 0.5) / count) for i in range(count)])
+        seen = [planes[..., r : r + patch, c : c + patch] for r in starts[0] for c in starts[1]]
+        runs = [session.run(["averages_out"], {"noisy": window, **level})[0] for window in seen]
+        level |= {"averages": np.mean(runs, axis=0, dtype="f4"), "frozen": np.ones((), "f4")}
+        overlap, clean = -(-radius // multiple) * multiple, np.empty_like(planes)
+        for r in range(0, rows, tile):
+            for c in range(0, columns, tile):
+                first, start = max(r - overlap, 0), max(c - overlap, 0)
+                window = planes[..., first : r + tile + overlap, start : c + tile + overlap]
+                (done,) = session.run(["clean"], {"noisy": window, **level})
+                clean[..., r : r + tile, c : c + tile] = done[..., r - first :, c - start :][
+                    ..., :tile, :tile
+                ]
+    out = np.empty_like(x)
+    out[0::2, 0::2], out[0::2, 1::2], out[1::2, 0::2], out[1::2, 1::2] = clean[0]
+    return out[top : top + height, left : left + width]
+
+
+@pytest.mark.parametrize(("height", "width", "cfa"), [(52, 58, "GRBG"), (98, 146, "GBRG"), (20, 166, "BGGR")])
+def test_the_description_in_the_file_is_enough(
+    rng: np.random.Generator, denoiser: Denoiser, exported: bytes, height: int, width: int, cfa: str
+) -> None:
+    raw = noisy_raw(rng, height, width, cfa)
+    expected = denoise_raw(raw, denoiser).mosaic
+    assert np.abs(expected - raw.mosaic).mean() > 1e-3
+    for tile in (24, 4096):
+        np.testing.assert_allclose(as_described(exported, raw, tile), expected, atol=1e-4, rtol=0)
+
+
 def test_the_command_writes_a_smaller_form_and_denoise_runs_it(
     rng: np.random.Generator,
     denoiser: Denoiser,

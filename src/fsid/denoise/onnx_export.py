@@ -33,17 +33,21 @@ _EXAMPLE_PX = 64
 _MAX_PX = 1 << 15
 
 DESCRIPTION = """FSID RAW denoiser: clean, averages_out = graph(noisy, k, sigma2, averages, frozen).
-Before: x = (DN - black) / (white - black) in float32, values below 0 kept. The Bayer mosaic becomes 4 planes
-R, Gr, Gb, B (Gr: the green in the rows of red): plane[i][j] = x[2i + row][2j + column], row and column of the
-site in an RGGB tile. Mirror another pattern outwards by one row and/or column (index -1 = index 1) so that
-its first pixel is R; cut that off again at the end. Pad the planes, mirroring, to multiples of `multiple`.
-Inputs: noisy (1, 4, H, W). k, sigma2 (1, 4): the noise variance of a site is k x + sigma2, in units of x, as
-in the DNG tag NoiseProfile. averages, frozen: leave them out, or see Tiles.
-After: clean (1, 4, H, W) in units of x, not clipped. Unpack it; DN = black + x (white - black).
-Tiles, for images that do not fit into memory: run some patches, `patch_px` wide and high in each plane, from
-all over the image, take the mean of their averages_out, and give it as `averages`, with frozen = 1, to tiles
-that start on multiples of `multiple` and overlap by `receptive_radius` rounded up to it; keep their inside.
-The result is that of one large call."""
+Before: x = (DN - black) / (white - black) in float32, values below 0 kept. Mirror the Bayer mosaic outwards
+(index -1 is index 1): by a row at the top and a column at the left where that makes its first pixel R, and at
+the bottom and right to multiples of 2 `multiple`. Its planes R, Gr, Gb, B are x[0::2, 0::2], x[0::2, 1::2],
+x[1::2, 0::2], x[1::2, 1::2].
+Inputs: noisy (1, 4, H, W), the planes. k, sigma2 (1, 4): the noise variance of a site is k x + sigma2, in
+units of x, as in the DNG tag NoiseProfile (where it has three pairs, both greens take the second). averages,
+frozen: leave them out, or see Large images.
+After: clean (1, 4, H, W) in units of x, not clipped. Unpack it in the same way and cut off what was mirrored;
+DN = black + x (white - black).
+Large images, where H or W is above 2 `patch_px`: first run patches, `patch_px` high and wide in a plane, in
+max(1, round(4 sqrt(H / W))) rows and max(1, round(4 sqrt(W / H))) columns. Number i of n along a side starts
+at round((side - patch_px) (i + 1/2) / n), halves to the even number, or at 0 where the side is shorter. Give
+the mean of their averages_out as `averages`, with frozen = 1, to the whole image, or to tiles that start on
+multiples of `multiple` and see `receptive_radius`, rounded up to such a one, beyond what is kept of them.
+Tiles make the same as the whole image with the same averages: what `fsid denoise` makes."""
 
 
 class _Half(nn.Module):
