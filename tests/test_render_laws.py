@@ -242,3 +242,15 @@ def test_a_room_closes_every_view(renderer: Renderer) -> None:
     assert (frame.object_id == -1).all()
     assert np.isfinite(frame.depth).all()
     assert frame.radiance.min() > 0
+
+
+@pytest.mark.parametrize("roughness", [20, 50, 100])
+def test_a_glossy_white_body_in_a_white_furnace(renderer: Renderer, roughness: int) -> None:
+    """Mirror and body of a dielectric share what arrives at any angle: in surroundings of 1 white shows 1, or a
+    little less where it is rough and the mirror loses some."""
+    sheet = Drawable(grid(8.0), STILL, (plain(ONE, roughness=roughness),), 0)
+    for angle in np.radians((0.0, 45.0, 60.0, 75.0, 85.0)):
+        at = (0.0, float(-2 * np.sin(angle)), float(2 * np.cos(angle)))
+        camera = Camera(at, (0.0, 0.0, 0.0), (0.0, 1.0, 1.0), 4.0, 16, 16)
+        shown = draw(renderer, view(sheet, ambient=1.0, camera=camera)).radiance[7:9, 7:9]
+        assert 0.97 < shown.min() <= shown.max() < 1.005

@@ -65,8 +65,10 @@ Reflector reflector_of(Sample p, Surface s, Matter m, float spread) {
     b.r = reflect(-b.v, b.n);
     b.alpha2 = min(m.alpha2 + 2.0 * spread, 1.0);
     b.alpha = sqrt(b.alpha2);
-    b.diffuse = m.albedo * ((1.0 - m.metallic) * (1.0 - s.specular));
     float nv = max(abs(dot(b.n, b.v)), 1e-3);
+    vec2 share = mirror_share(sqrt(b.alpha), nv);
+    float taken = max(s.specular, s.specular * share.x + min(share.y, 50.0 * s.specular));   // by the mirror
+    b.diffuse = m.albedo * ((1.0 - m.metallic) * (1.0 - taken));
 #if GLASS
     b.diffuse *= 1.0 - s.transmission;
 #endif
@@ -82,7 +84,6 @@ Reflector reflector_of(Sample p, Surface s, Matter m, float spread) {
     b.diffuse *= 1.0 - s.translucency;
 #endif
     b.f0 = mix(vec3(s.specular), m.albedo, m.metallic);
-    vec2 share = mirror_share(sqrt(b.alpha), nv);
     b.rebound = 1.0 + b.f0 * (1.0 / max(share.x + share.y, 0.1) - 1.0);
     b.mirror = b.rebound * (b.f0 * share.x + min(share.y, 50.0 * max(b.f0.r, max(b.f0.g, b.f0.b))));
     return b;
