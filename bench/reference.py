@@ -2,10 +2,12 @@
 
     python bench/reference.py --width 960 --samples 64                 Mitsuba 3 (fsid[reference])
     python bench/reference.py --width 960 --blender PYTHON             Blender Cycles too, through the .glb
+    python bench/reference.py --direct --objects 12 --width 240        agreement about the lights alone
 
 Times are the best of `--repeat` draws of a scene that is already loaded, in one run, renderers in turn;
 PYTHON is an interpreter that has `bpy`. Noise is the standard deviation between two renders that differ in
-their seed alone, relative to the median radiance: the rasteriser's is 0 by construction (same bits).
+their seed alone, relative to the median radiance: the rasteriser's is 0 by construction (same bits). --direct
+compares what comes straight from the lights: one bounce, and no light of the walls in the rasteriser.
 """
 
 from __future__ import annotations
@@ -23,8 +25,10 @@ import numpy as np
 from PIL import Image
 
 from fsid.render import Frame, Renderer
+from fsid.render.drawable import View, view_of
 from fsid.render.reference import ReferenceRenderer, agreement
 from fsid.scene import Scene, SceneConfig, sample
+from fsid.scene.model import ZERO
 
 
 def main() -> None:
@@ -36,17 +40,20 @@ def main() -> None:
     parser.add_argument("--texture-size", type=int, default=512, help="texels per side of a material")
     parser.add_argument("--repeat", type=int, default=2, help="draws of each, the fastest counts")
     parser.add_argument("--blender", type=Path, help="Python with bpy: Cycles with 32 samples and denoiser")
+    parser.add_argument("--direct", action="store_true", help="compare direct light instead, in rooms")
     parser.add_argument("--figure", type=Path, help="picture of both renderers side by side to write")
     options = parser.parse_args()
-    path_tracer = ReferenceRenderer(samples=options.samples, texture_size=options.texture_size)
+    path_tracer = ReferenceRenderer(
+        samples=options.samples, texture_size=options.texture_size, bounces=1 if options.direct else 7
+    )
     print(f"Mitsuba {path_tracer.variant}, {options.samples} samples, {options.width} px wide")
     panels = []
     with Renderer(texture_size=options.texture_size) as raster:
         for seed in options.seeds:
             config = SceneConfig(objects=(options.objects, options.objects))
             scene = sample(config, seed, width=options.width, height=options.width * 9 // 32 * 2)
-            scene = plain_lens(scene)
-            panels.append(compare(raster, path_tracer, scene, options))
+            make = direct if options.direct else compare
+            panels.append(make(raster, path_tracer, plain_lens(scene), options))
     if options.figure:
         Image.fromarray(np.vstack(panels)).save(options.figure)
 
@@ -85,6 +92,27 @@ def compare(
         cycles_s = cycles(options.blender, scene)
         print(f"  Cycles, 32 samples + denoiser: {cycles_s:.1f} s = {cycles_s / raster_s:.0f} x")
     return np.hstack([developed(drawn, drawn), developed(traced, drawn)])
+
+
+def direct(
+    raster: Renderer, path_tracer: ReferenceRenderer, scene: Scene, options: argparse.Namespace
+) -> np.ndarray:
+    """Prints how both agree about light that comes straight from the lights; returns both images."""
+    if scene.sky is not None:
+        raise SystemExit(f"seed {scene.seed} is open air, where the sky is a light too: choose a room")
+    camera = replace(scene.cameras[0], aperture_m=0.0, exposure_s=0.0, softness_px=0.0)
+    scene = replace(scene, cameras=(camera,))
+    drawn, traced = raster.draw(without_walls_light(scene)), path_tracer.render(scene)
+    kinds = ", ".join(light.kind for light in scene.lights)
+    print(f"scene {scene.seed}, {scene.background.kind}, {kinds}: {agreement(drawn, traced)}")
+    return np.hstack([developed(drawn, drawn), developed(traced, drawn)])
+
+
+def without_walls_light(scene: Scene) -> View:
+    """The view of a scene whose walls look as they do and light nothing."""
+    view, black = view_of(scene, 0), (ZERO, ZERO, ZERO)
+    walls = tuple(replace(wall, colours=black, emission=0.0) for wall in view.room_materials)
+    return replace(view, room_materials=walls, ambient=ZERO)
 
 
 def seconds(work: Callable[[], object]) -> float:

@@ -254,3 +254,17 @@ def test_a_coat_reflects_as_a_dielectric_of_the_path_tracer(monkeypatch: pytest.
     monkeypatch.setattr(reference_renderer, "bsdf_of", dielectric)
     coat = renderer(256).render(scene).radiance.sum()
     assert coated.radiance.sum() == pytest.approx(coat + 0.93 * bare, rel=0.04)
+
+
+def test_depth_may_differ_by_what_half_a_pixel_changes_and_no_more():
+    """A floor from 0.5 m above it, seen through the middle of the pixels and a quarter of one beside that."""
+    flat = np.zeros((40, 60, 3), np.float32)
+
+    def frame(sample: float, scale: float = 1.0) -> Frame:
+        depth = 0.5 / ((np.arange(40) + sample + 4) / 50)
+        wide = np.broadcast_to((scale * depth)[:, None], (40, 60)).astype(np.float32)
+        return Frame(flat + 1, flat, flat + np.float32((0, 1, 0)), wide, np.zeros((40, 60), np.int32))
+
+    assert np.abs(frame(0.75).depth / frame(0.5).depth - 1).max() > 0.05
+    assert agreement(frame(0.75), frame(0.5)).depth_off == 0
+    assert agreement(frame(0.5, 1.15), frame(0.5)).depth_off == 1
