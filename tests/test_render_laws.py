@@ -246,8 +246,8 @@ def test_a_room_closes_every_view(renderer: Renderer) -> None:
 
 @pytest.mark.parametrize("roughness", [20, 50, 100])
 def test_a_glossy_white_body_in_a_white_furnace(renderer: Renderer, roughness: int) -> None:
-    """Mirror and body of a dielectric share what arrives at any angle: in surroundings of 1 white shows 1, or a
-    little less where it is rough and the mirror loses some."""
+    """Mirror and body of a dielectric share what arrives at any angle: in surroundings of 1 white shows 1,
+    or a little less where it is rough and the mirror loses some."""
     sheet = Drawable(grid(8.0), STILL, (plain(ONE, roughness=roughness),), 0)
     for angle in np.radians((0.0, 45.0, 60.0, 75.0, 85.0)):
         at = (0.0, float(-2 * np.sin(angle)), float(2 * np.cos(angle)))
