@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from fsid.config import load_settings, save_settings
+from fsid.config import from_plain, load_settings, save_settings
 from fsid.errors import FsidError
 
 
@@ -51,6 +51,9 @@ def test_saved_settings_load_back(tmp_path: Path):
         ("inner.rate=fast", "rate"),
         ("inner.rate=-1", "inner.rate"),
         ("size_m=[1]", "size_m"),
+        ("size_m=[1, x]", "size_m"),
+        ("inner.names=mug", "names: 'mug' is not a list; write [mug]"),
+        ("inner.names=[1]", "names"),
         ("count.x=1", "count"),
         ("count", "count"),
         ("count=[", "count"),
@@ -69,6 +72,12 @@ def test_a_broken_file_is_one_line_that_names_it(tmp_path: Path, text: str):
     file.write_text(text)
     with pytest.raises(FsidError, match=r"broken\.yaml"):
         load_settings(Outer, file)
+
+
+@pytest.mark.parametrize("plain", [["count"], None, 3, "count"])
+def test_what_has_no_keys_is_no_settings(plain: object):
+    with pytest.raises(FsidError, match=r"from here: expected keys"):
+        from_plain(Outer, plain, source="from here")
 
 
 def test_a_missing_file_is_named(tmp_path: Path):

@@ -11,7 +11,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args, get_origin
 
 import cattrs
 import yaml
@@ -46,7 +46,19 @@ def _strict_str(value: Any, _: type) -> str:
     return value
 
 
+def _strict_tuple(value: Any, kind: Any) -> tuple[Any, ...]:
+    """A text is a list of letters for Python; a folder without brackets must not become "/" and "."."""
+    if not isinstance(value, list | tuple):
+        raise ValueError(f"{value!r} is not a list; write [{value}]")
+    kinds = get_args(kind)
+    kinds = (kinds[0],) * len(value) if kinds[-1] is ... else kinds
+    if len(kinds) != len(value):
+        raise ValueError(f"{value!r} is not a list of {len(kinds)}")
+    return tuple(_CONVERTER.structure(item, inner) for item, inner in zip(value, kinds, strict=True))
+
+
 _CONVERTER = cattrs.Converter(forbid_extra_keys=True)
+_CONVERTER.register_structure_hook_func(lambda kind: get_origin(kind) is tuple, _strict_tuple)
 for _kind, _hook in ((int, _strict_int), (float, _strict_float), (bool, _strict_bool), (str, _strict_str)):
     _CONVERTER.register_structure_hook(_kind, _hook)
 
@@ -71,6 +83,8 @@ def from_plain(kind: type[T], plain: Any, *, source: str) -> T:
     Raises FsidError, naming `source` and the key, for unknown keys, wrong types and values that the
     dataclass itself refuses.
     """
+    if not isinstance(plain, Mapping):
+        raise FsidError(f"{source}: expected keys with values, got {plain!r:.60}")
     try:
         return _CONVERTER.structure(plain, kind)
     except cattrs.BaseValidationError as error:
