@@ -56,6 +56,8 @@ def _npy(array):
         ("a.npy", _npy(DN.astype(np.int64) * 20), {}, "65535"),
         ("a.npy", _npy(DN.astype(np.int32) - 4096), {}, "65535"),
         ("a.npy", _npy(np.zeros((4, 4, 3), np.uint16)), {}, r"\(4, 4, 3\)"),
+        ("a.npy", b"a text", {}, "no array of numbers"),
+        ("a.npy", _npy(DN)[:90], {}, "no array of numbers"),
         ("a.npy", _npy(np.array([{"a": 1}])), {}, r"a\.npy"),
         ("a.npy", lambda p: p.write_bytes(b"text"), {}, r"a\.npy"),
         ("a.png", lambda p: p.write_bytes(b"text"), {}, r"a\.png"),

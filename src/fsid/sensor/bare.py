@@ -126,6 +126,8 @@ def _read(path: Path, cfa: str | None, width: int | None, height: int | None) ->
         return _read_png(path) if kind == ".png" else _read_tiff(path)
     except Exception as error:  # a decoder of a broken file raises anything, zlib.error among it
         reason = (str(error).splitlines() or [type(error).__name__])[0]
+        if kind == ".npy" and isinstance(error, ValueError):
+            reason = "it is no array of numbers"  # NumPy's own line advises to unpickle it
         raise FsidError(f"{path}: cannot read this {kind} file: {reason}") from error
 
 
