@@ -59,6 +59,18 @@ def test_more_colours_give_more_entropy_and_coverage():
         assert colourful[name].mean() > grey[name].mean(), name
 
 
+def test_exposure_and_cast_tell_what_a_whole_picture_has():
+    picture = np.random.default_rng(3).uniform(0.2, 0.6, (96, 96, 1)).repeat(3, axis=2).astype(np.float32)
+    plain, dark, red, blue = (
+        measure(picture * np.array(gains, np.float32))
+        for gains in ((1, 1, 1), (0.5, 0.5, 0.5), (1.3, 1, 1), (1, 1, 1.3))
+    )
+    assert dark["exposure"] < plain["exposure"] - 10
+    assert red["cast_a"] > plain["cast_a"] + 5
+    assert blue["cast_b"] < plain["cast_b"] - 5
+    assert abs(plain["cast_a"]) + abs(plain["cast_b"]) < 0.1
+
+
 def test_colour_of_things_and_colour_of_texture_are_told_apart():
     """Two plain halves of different hue, and a pixel-wise mixture of the same two colours."""
     colours = np.array([(0.7, 0.4, 0.4), (0.4, 0.5, 0.7)], np.float32)

@@ -47,7 +47,10 @@ TITLES: Mapping[str, str] = MappingProxyType(
         "clipped_share": "share of clipped pixels",
         "black_share": "share of near-black pixels",
         "lightness": "lightness L*",
+        "exposure": "median lightness L* of a picture",
         "colourfulness": "colourfulness (Hasler and Suesstrunk 2003)",
+        "cast_a": "cast of a picture, mean a* (green to red)",
+        "cast_b": "cast of a picture, mean b* (blue to yellow)",
         "ab_coverage": "covered cells of the a*b* plane",
         "colour_entropy": "patch-colour entropy, bits",
         "colour_regions": "spread of patch colours within a picture, a*b*",
@@ -171,6 +174,9 @@ def _colours(image: np.ndarray) -> dict[str, np.ndarray]:
     )
     return {
         "lightness": np.quantile(lab[..., 0], _LEVELS),
+        "exposure": _one(np.median(lab[..., 0])),
+        "cast_a": _one(lab[..., 1].mean()),
+        "cast_b": _one(lab[..., 2].mean()),
         "colourfulness": _one(colourfulness),
         "ab_coverage": _one((counts > AB_SHARE * counts.sum()).sum()),
         "colour_entropy": np.quantile(entropy, _LEVELS),
