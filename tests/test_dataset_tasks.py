@@ -60,7 +60,7 @@ OBJECTS_MOVE = [
 def test_a_blurred_image_has_the_light_of_the_sharp_one_and_less_detail(
     motion: list[str], renderer: Renderer
 ) -> None:
-    sample = make_sample(config("task=deblur", "scene.motion.exposure_s=[0.2,0.2]", *motion), 3, 0, renderer)
+    sample = make_sample(config("task=deblur", "scene.motion.exposure_s=[0.2,0.2]", *motion), 6, 0, renderer)
     blurred = sample.more["degraded"]
     assert blurred.mosaic.shape == sample.clean.mosaic.shape
     assert blurred.mosaic.mean() == pytest.approx(sample.clean.mosaic.mean(), rel=0.05)
@@ -123,7 +123,7 @@ def test_a_linear_render_takes_the_exact_linear_path(
     exposure.integers(1)  # the camera
     gain = exposure_rand(exposure, light.astype(np.float32))
     colour = np.random.default_rng(np.random.SeedSequence(0, spawn_key=(0, 0, 3, 0)))
-    expected = clean_from_linear(colour, light.astype(np.float32) * np.float32(gain), load_profile("pixel6"))
+    expected = clean_from_linear(colour, light.astype(np.float32) * gain, load_profile("pixel6"))
     np.testing.assert_array_equal(sample.clean.mosaic, expected.mosaic)
 
 

@@ -126,8 +126,8 @@ class Attempt:
     def _shot(self, source: _Source, number: int) -> _Shot:
         rng = self._rng(_EXPOSURE, number)
         profile = load_profile(self.config.cameras[rng.integers(len(self.config.cameras))])
-        gain = exposure_rand(rng, source.views.truth) if source.is_linear else None
-        return _Shot(profile, gain, self._stream(_COLOUR, number))
+        gains = exposure_rand(rng, source.views.truth) if source.is_linear else None
+        return _Shot(profile, gains, self._stream(_COLOUR, number))
 
     def _window(self, views: Views, number: int) -> Window:
         width, height = self.config.crop_width, self.config.crop_height
@@ -198,18 +198,18 @@ class _Source:
 
 @dataclass(frozen=True)
 class _Shot:
-    """One exposure of a frame: camera, brightness and colour. gain: None for photographs."""
+    """One exposure of a frame: camera, brightness and colour. gains: (3,), None for photographs."""
 
     profile: CameraProfile
-    gain: float | None
+    gains: np.ndarray | None
     colour: np.random.SeedSequence
 
     def clean(self, image: np.ndarray) -> Raw:
         """The RAW of `image` (H, W, 3); the same colour for every image of the shot."""
         rng = np.random.default_rng(self.colour)
-        if self.gain is None:
+        if self.gains is None:
             return clean_from_photo(rng, image, self.profile)
-        return clean_from_linear(rng, image * np.float32(self.gain), self.profile)
+        return clean_from_linear(rng, image * self.gains, self.profile)
 
 
 def sample_key(index: int) -> str:

@@ -1,11 +1,14 @@
-"""Auto-exposure: how many times the scene's light becomes the sensor's full scale.
+"""Auto-exposure and auto white balance: how many times the scene's light becomes the sensor's full scale.
 
-    gain = min(key / median(Y), 1 / percentile(Y, 100 - clipped)),      Y = luminance of the frame
+    gains = e b,   b = (world / c)^w,   e = min(key / median(Y b), 1 / percentile(Y b, 100 - clipped))
 
+Y is the luminance of a pixel and c, per channel, the mean over the frame of colour / luminance. White balance
+as cameras do it, by what they see: an average scene is taken for the `world`, and the frame is moved towards
+it by a share w, uniform over 0.1 to 0.8. So a red floor fills few photographs with as much red as it has.
 A camera meters the scene to a mid-grey and backs off for highlights, and neither exactly. So `key` is
-log-uniform over 0.05 to 0.5 (an 18 % card, from 1.5 stops over to two under) and the share of pixels that
-may reach saturation is log-uniform over 0.005 % to 25 %: a white sky or snow burns out in one photograph in
-twenty, and a denoiser that never saw it loses most there (docs/results.md).
+log-uniform over 0.07 to 0.36 (an 18 % card, from a stop over to one and a third under) and the share of
+pixels that may reach saturation is log-uniform over 0.005 % to 25 %: a white sky or snow burns out in one
+photograph in twenty, and a denoiser that never saw it loses most there (docs/results.md).
 Low light needs no darker image: the camera answers it with ISO, and ISO sets the noise.
 """
 
@@ -16,21 +19,28 @@ import numpy as np
 from fsid.errors import FsidError
 from fsid.sensor.colour import SRGB_TO_XYZ
 
-KEY_RANGE = (0.05, 0.5)
+KEY_RANGE = (0.07, 0.36)
 CLIPPED_PERCENT_RANGE = (0.005, 25.0)
+BALANCED_RANGE = (0.1, 0.8)
+WORLD_RGB = (0.98, 1.02, 0.74)
+"""What photographs average to at luminance 1, linear sRGB: 100 of BSDS500, geometric mean."""
+
+_LUMINANCE = SRGB_TO_XYZ[1].astype(np.float32)
 
 
-def exposure_rand(rng: np.random.Generator, radiance: np.ndarray) -> float:
-    """Draw the factor that takes linear sRGB `radiance` (H, W, 3) >= 0 to units of sensor saturation."""
+def exposure_rand(rng: np.random.Generator, radiance: np.ndarray) -> np.ndarray:
+    """Draw the factors (3,) that take linear sRGB `radiance` (H, W, 3) >= 0 to units of sensor saturation."""
     if not np.all(np.isfinite(radiance)):
         raise FsidError("the frame holds NaN or infinite radiance; check its lights and materials")
-    luminance = radiance.astype(np.float32, copy=False) @ SRGB_TO_XYZ[1].astype(np.float32)
+    light = radiance.astype(np.float32, copy=False)
     key = np.exp(rng.uniform(*np.log(KEY_RANGE)))
     clipped_percent = np.exp(rng.uniform(*np.log(CLIPPED_PERCENT_RANGE)))
-    middle, highlight = np.percentile(luminance, (50, 100 - clipped_percent))
+    balance = _to_world(light) ** rng.uniform(*BALANCED_RANGE)
+    middle, highlight = np.percentile(light @ (_LUMINANCE * balance), (50, 100 - clipped_percent))
     if highlight <= 0:
-        return 1.0
-    return float(min(key / middle, 1 / highlight)) if middle > 0 else float(1 / highlight)
+        return np.ones(3, np.float32)
+    gain = min(key / middle, 1 / highlight) if middle > 0 else 1 / highlight
+    return (gain * balance).astype(np.float32)
 
 
 def expose(rng: np.random.Generator, radiance: np.ndarray) -> np.ndarray:
@@ -38,4 +48,14 @@ def expose(rng: np.random.Generator, radiance: np.ndarray) -> np.ndarray:
 
     The sensor's channels saturate one by one, so `unprocess.linear_to_camera` does the clipping.
     """
-    return radiance.astype(np.float32, copy=False) * np.float32(exposure_rand(rng, radiance))
+    return radiance.astype(np.float32, copy=False) * exposure_rand(rng, radiance)
+
+
+def _to_world(light: np.ndarray) -> np.ndarray:
+    """(3,) float32 gains under which the average pixel has the colour `WORLD_RGB`; bounded by 1/4 and 4."""
+    luminance = light @ _LUMINANCE
+    lit = luminance > 0
+    if not lit.any():
+        return np.ones(3, np.float32)
+    mean = (light[lit] / luminance[lit][:, None]).mean(axis=0)
+    return np.clip(np.array(WORLD_RGB, np.float32) / np.maximum(mean, 1e-6), 0.25, 4.0)
