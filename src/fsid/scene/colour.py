@@ -23,7 +23,7 @@ _XYZ_TO_RGB = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [
 _WHITE = np.array([0.9505, 1.0, 1.089])
 _DESATURATED = np.array([(1.0, keep, keep) for keep in (1.0, 0.8, 0.6, 0.4, 0.2, 0.0)])
 _NATURAL_HUES_DEG = (62.0, 80.0, 108.0, 138.0, 262.0, 35.0, 15.0, 320.0)
-_NATURAL_SHARES = (0.20, 0.16, 0.13, 0.18, 0.14, 0.10, 0.05, 0.04)
+_NATURAL_SHARES = (0.13, 0.16, 0.19, 0.24, 0.18, 0.05, 0.03, 0.02)
 
 
 class Mood(NamedTuple):
@@ -88,7 +88,7 @@ def lab_rand(rng: np.random.Generator, palette: str, mood: Mood) -> np.ndarray:
             lab = np.array([rng.uniform(10, 95), *rng.uniform(-75, 75, 2)])
             if np.all((rgb := lab_to_rgb(lab)) > 0) and np.all(rgb < 1):
                 return lab
-    level = rng.uniform(8, 96)
+    level = rng.uniform(8, 96, 2).mean()
     if palette == "grey":
         hue, chroma = rng.uniform(0, 360), rng.uniform(0, 5)
     elif palette == "harmonised":

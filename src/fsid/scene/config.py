@@ -55,9 +55,9 @@ class MaterialConfig:
     """Factor on the relief of the height maps."""
     albedo: Range = knob((0.02, 0.9), 0.0, 1.0)
     """Limits of the linear albedo of surface colours, per channel."""
-    palette_shares: tuple[float, float, float, float] = shares(0.57, 0.15, 0.06, 0.22)
+    palette_shares: tuple[float, float, float, float] = shares(0.60, 0.12, 0.06, 0.22)
     """Shares of the palette models natural, harmonised, lab, grey."""
-    contrast: Range = knob((0.1, 1.0), 0.0, 1.0)
+    contrast: Range = knob((0.3, 1.0), 0.0, 1.0)
     """How far the colours of one material may lie apart: 1 as drawn, 0 all alike."""
     natural_share: float = knob(0.4, 0.0, 1.0)
     """Share of materials in the colours that their family has in nature, where it has some."""
@@ -82,7 +82,7 @@ class MaterialConfig:
 class BackgroundConfig:
     """B: what surrounds the objects."""
 
-    kind_shares: tuple[float, float, float, float] = shares(0.5, 0.1, 0.15, 0.25)
+    kind_shares: tuple[float, float, float, float] = shares(0.42, 0.1, 0.13, 0.35)
     """Shares of room, backdrop, tabletop, open-air."""
     width_m: Range = knob((3.0, 6.0), 2.0, 100.0)
     """Width of a closed room along x and along y."""
@@ -117,7 +117,7 @@ class LightConfig:
     """Irradiance of all lights together at the focus, radiance units x sr; log-uniform."""
     temperature_k: Range = knob((1800.0, 10000.0), 1000.0, 40000.0)
     """Colour temperature of a light; uniform in 1 / temperature (mired), as steps look alike there."""
-    adaptation: Range = knob((0.75, 1.0), 0.0, 1.0)
+    adaptation: Range = knob((0.85, 1.0), 0.0, 1.0)
     """How far the camera's white balance has removed the common colour of the lights: 1 all of it."""
     tinted_share: float = knob(0.06, 0.0, 1.0)
     """Share of lamps that are coloured LEDs."""
@@ -127,7 +127,7 @@ class LightConfig:
     """Edges of an area light; log-uniform."""
     distance_m: Range = knob((0.9, 2.4), 0.1, 100.0)
     """Distance of a lamp from the focus."""
-    ambient_share: Range = knob((0.4, 2.5), 1e-4, 10.0)
+    ambient_share: Range = knob((0.8, 4.0), 1e-4, 10.0)
     """Irradiance from the surroundings relative to that from the lights; log-uniform."""
     sun_share: float = knob(0.6, 0.0, 1.0)
     """Share of open-air scenes with sunlight; the others have an overcast sky or, by `night_share`, lamps."""
