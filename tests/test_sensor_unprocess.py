@@ -149,7 +149,7 @@ def test_a_black_frame_stays_black_and_a_mostly_black_one_is_exposed_for_its_lig
 
 
 def test_white_balance_takes_a_part_of_what_tints_a_whole_frame_and_leaves_differences():
-    """A frame in red light comes out less red, by the share that is drawn; lost is nothing between its pixels."""
+    """A frame in red light comes out less red by the share that is drawn, and else as it was."""
     grey = np.random.default_rng(0).lognormal(0, 0.5, (40, 50, 1)).astype(np.float32) * np.ones(3, np.float32)
     red = grey * np.array([4.0, 1.0, 1.0], np.float32)
     for seed in range(20):
