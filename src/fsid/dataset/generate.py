@@ -132,6 +132,10 @@ def dataset_config(config: GenerateConfig, seed: int, shard_size: int = 0) -> Da
     """The identity of the dataset of (config, seed); FsidError where what it names does not exist."""
     for camera in config.cameras:
         load_profile(camera)
+    scene = config.scene
+    for folder in (*scene.mesh_folders, *scene.texture_folders, scene.hdri_folder):
+        if not Path(folder).exists():
+            raise FsidError(f"{folder}: there is no such folder")
     pictures = len(find_pictures(Path(config.images))) if config.images else 0
     pairs = config.pairs_per_frame
     shard_size = shard_size or -(-SHARD_SIZE // pairs) * pairs
