@@ -20,17 +20,20 @@ from fsid.denoise.quality import CALIBRATED, probes
 from fsid.sensor import pack
 
 _CALIBRATION_TILE = 128
+_WARNINGS, _ERRORS = 2, 3
+"""Severities of onnxruntime's own log; the first is its default."""
 
 
 def eight_bit(model: Any) -> Any:
     """An 8-bit copy of an `onnx.ModelProto` of `onnx_model`."""
     import onnx
-    from onnxruntime import quantization
+    from onnxruntime import quantization, set_default_logger_severity
 
     convolutions = [node.name for node in model.graph.node if node.op_type == "Conv"]
     log = logging.getLogger()
     level = log.level
     log.setLevel(logging.ERROR)  # it recommends a preprocessing step that changes nothing here
+    set_default_logger_severity(_ERRORS)  # and constants where averages must stay inputs
     try:
         with tempfile.TemporaryDirectory() as folder:
             source, target = Path(folder) / "float.onnx", Path(folder) / "int8.onnx"
@@ -49,6 +52,7 @@ def eight_bit(model: Any) -> Any:
             small = onnx.load(target)
     finally:
         log.setLevel(level)
+        set_default_logger_severity(_WARNINGS)
     onnx.helper.set_model_props(small, {p.key: p.value for p in model.metadata_props})
     return small
 
