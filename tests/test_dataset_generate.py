@@ -101,6 +101,14 @@ def test_photographs_go_through_the_same_chain(photos: Path, tmp_path: Path):
     assert record["image"] == "coffee-1.png"
 
 
+def test_photographs_are_the_same_data_whatever_scenes_would_be(photos: Path, tmp_path: Path):
+    """So data made before the defaults of scenes changed is gone on with."""
+    generate(tmp_path, small(f"images={photos}", "scene.objects=[3, 4]", "variant=objects"), count=1)
+    assert generate(tmp_path, small(f"images={photos}"), count=2) == 2
+    with pytest.raises(FsidError, match=r"generate\.iso_range"):
+        generate(tmp_path, small(f"images={photos}", "iso_range=[100, 200]"), count=2)
+
+
 @pytest.mark.parametrize(
     ("override", "named"),
     [

@@ -11,7 +11,7 @@ import fcntl
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from fsid.config import from_plain, read_yaml, save_settings, to_plain
@@ -180,12 +180,22 @@ def _claim(out: Path, dataset: DatasetConfig) -> None:
         save_settings(dataset, file)
         return
     there = from_plain(DatasetConfig, read_yaml(file), source=str(file))
+    there, dataset = _used(there), _used(dataset)
     if there != dataset:
         keys = ", ".join(_differing(to_plain(there), to_plain(dataset)))
         raise FsidError(
             f"{out}: already holds another dataset; these differ: {keys}. "
             "Use another folder, or the same settings"
         )
+
+
+def _used(dataset: DatasetConfig) -> DatasetConfig:
+    """`dataset` with defaults for what its samples do not depend on: pictures are not rendered."""
+    config, unused = dataset.generate, GenerateConfig()
+    if not config.images:
+        return dataset
+    keys = ("variant", "renderer", "quality", "supersampling", "texture_size", "scene")
+    return replace(dataset, generate=replace(config, **{key: getattr(unused, key) for key in keys}))
 
 
 def _differing(there: dict, here: dict, path: str = "") -> Iterator[str]:
