@@ -5,6 +5,8 @@ scene is drawn once before it is timed, so baking and compiling are not counted;
 draws counts, because other work on the machine only ever adds. "cpu" is processor time of all threads: it
 stays true on a busy machine, and its half is what two free cores would take.
 
+--plain draws scenes of the kind that the prototype of this renderer was timed with instead: 40 objects in a
+room, three shadowed point and spot lights, 20 materials without clearcoat, sheen and such, an ideal lens.
 --fidelity compares both qualities with 4 x 4 samples per pixel (PSNR of the radiance, scaled so that its
 97th percentile is white, at 480x270). --triangles draws one scene with meshes divided into ever more
 triangles. Memory over many scenes: bench/dataset.py --only memory.
@@ -13,6 +15,7 @@ triangles. Memory over many scenes: bench/dataset.py --only memory.
 from __future__ import annotations
 
 import argparse
+import itertools
 import resource
 import time
 from collections.abc import Sequence
@@ -24,6 +27,8 @@ from fsid.assets import Mesh
 from fsid.render import Renderer
 from fsid.render.drawable import View, view_of
 from fsid.scene import Scene, SceneConfig, sample
+from fsid.scene.camera_config import LensConfig
+from fsid.scene.config import BackgroundConfig, LightConfig, MaterialConfig
 
 SIZES = ((960, 540), (1920, 1080))
 STAGES = ("scene build", "upload", "shadows", "mirror", "samples", "occlusion", "shading", "readback")
@@ -36,6 +41,7 @@ def main() -> None:
     parser.add_argument("--texture-size", type=int, default=512, help="texels per side of a material")
     parser.add_argument("--device", type=int, default=None, help="EGL device")
     parser.add_argument("--quality", default="high", help="high or fast")
+    parser.add_argument("--plain", action="store_true", help="plain scenes of three lights, 20 materials")
     parser.add_argument("--fidelity", action="store_true", help="compare the qualities instead")
     parser.add_argument("--triangles", action="store_true", help="cost over triangles instead")
     options = parser.parse_args()
@@ -57,9 +63,25 @@ def open_renderer(options: argparse.Namespace, quality: str, supersampling: int 
     )
 
 
-def scenes_of(count: int, width: int, height: int) -> list[Scene]:
+def scenes_of(count: int, width: int, height: int, *, plain: bool = False) -> list[Scene]:
     config = SceneConfig(objects=(40, 40))
-    return [sample(config, seed, width=width, height=height) for seed in range(count)]
+    if plain:
+        config = replace(
+            config,
+            materials=MaterialConfig(lobe_share=0.0),
+            background=BackgroundConfig(kind_shares=(1.0, 0.0, 0.0, 0.0)),
+            lights=LightConfig(count=(3, 3), kind_shares=(0.6, 0.4, 0.0)),
+            lens=LensConfig(blur_share=0.0, vignetting_share=0.0, fringe_share=0.0),
+        )
+    scenes = [sample(config, seed, width=width, height=height) for seed in range(count)]
+    return [of_few_materials(scene, 20) for scene in scenes] if plain else scenes
+
+
+def of_few_materials(scene: Scene, count: int) -> Scene:
+    """`scene` with its objects made of the first `count` of their materials."""
+    few = [material for materials in scene.materials for material in materials][:count]
+    turn = itertools.cycle(few)
+    return replace(scene, materials=tuple(tuple(next(turn) for _ in each) for each in scene.materials))
 
 
 def frames(renderer: Renderer, options: argparse.Namespace) -> None:
@@ -67,7 +89,7 @@ def frames(renderer: Renderer, options: argparse.Namespace) -> None:
     print(f"{'size':>10} {'total s':>8} {'cpu s':>8}  " + "  ".join(f"{stage:>11}" for stage in STAGES))
     totals = []
     for width, height in SIZES:
-        views = [view_of(scene, 0) for scene in scenes_of(options.frames, width, height)]
+        views = [view_of(scene, 0) for scene in scenes_of(options.frames, width, height, plain=options.plain)]
         rows = [fastest(renderer, view, options.repeat) for view in views]
         mean = {key: sum(row[key] for row in rows) / len(rows) for key in rows[0]}
         totals.append(mean)
