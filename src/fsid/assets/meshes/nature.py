@@ -147,9 +147,8 @@ def fallen_leaves(rng: np.random.Generator) -> Parts:
         roll = rng.uniform(2, 9)
 
         def curl(p: np.ndarray, roll: float = roll) -> np.ndarray:
-            return np.c_[
-                p[:, 0], np.sin(roll * p[:, 1]) / roll, p[:, 2] + (1 - np.cos(roll * p[:, 1])) / roll
-            ]
+            radius, angle = 1 / roll - p[:, 2], roll * p[:, 1]
+            return np.c_[p[:, 0], radius * np.sin(angle), 1 / roll - radius * np.cos(angle)]
 
         curled = leaf.warped(curl)
         count = int(rng.integers(6, 22))
