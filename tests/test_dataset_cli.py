@@ -10,10 +10,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from fsid.cli.libraries import read_mesh_folders
 from fsid.cli.main import main
 from fsid.cli.progress import progress_bar
 from fsid.dataset import generate_config, shard_path
 from fsid.dataset.shards import read_samples
+from fsid.errors import FsidError
+from fsid.scene import SceneConfig
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 
@@ -50,6 +53,21 @@ def test_only_makes_the_same_bytes_from_a_key_and_from_json(data: Path, tmp_path
     assert loose(tmp_path / "again", "00000003") == stored
     main([*(word.replace("/data", "/elsewhere") for word in words(data)), "--only", "3"])
     assert loose(data / "elsewhere", "00000003") == stored
+
+
+def test_meshes_that_are_skipped_are_counted_and_the_first_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "good.obj").write_text(
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+    )
+    (tmp_path / "junk.ply").write_bytes(b"junk")
+    read_mesh_folders(SceneConfig(mesh_folders=(str(tmp_path),)), quiet=False)
+    said = capsys.readouterr().err
+    assert "reading" in said
+    assert re.search(r"1 meshes, 1 skipped, first \S*junk\.ply: \w+", said.replace("\n", " "))
+    with pytest.raises(FsidError, match="no usable mesh"):
+        read_mesh_folders(SceneConfig(mesh_folders=(str(tmp_path / "junk.ply"),)), quiet=True)
 
 
 @pytest.mark.parametrize(

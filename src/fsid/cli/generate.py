@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Literal
 from rich.console import Console
 from tyro.conf import Positional
 
+from fsid.cli.libraries import read_mesh_folders
 from fsid.cli.progress import progress_bar
 from fsid.errors import FsidError
 
@@ -98,6 +99,8 @@ def generate(
     if count is None or count < 1:
         raise FsidError("--count: say how many pairs the dataset is to have, at least 1")
     settings, workforce = generate_config(config, overrides), Workforce(workers, ray, workers_per_gpu)
+    if not settings.images:
+        read_mesh_folders(settings.scene, quiet=quiet)
     if dry_run:
         costs = estimate(settings, count=count, seed=seed, workforce=workforce)
         Console().print(_plan(out, costs, workers), soft_wrap=True)

@@ -7,6 +7,7 @@ from pathlib import Path
 from tyro.conf import Positional
 
 from fsid.cli.generate import Variant
+from fsid.cli.libraries import read_mesh_folders
 from fsid.cli.progress import progress_bar
 
 
@@ -40,5 +41,6 @@ def preview(
     check_png(output)
     overrides = [*set, f"width={width}", f"height={height}", f"variant={variant}"]
     settings = generate_config(config, overrides)
+    read_mesh_folders(settings.scene, quiet=quiet)
     with progress_bar("scenes", "scenes", quiet=quiet) as progress:
         save_png(output, contact_sheet(settings, seed, count, progress=progress))
