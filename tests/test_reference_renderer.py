@@ -172,6 +172,7 @@ def still_life(*lights: Light) -> Scene:
         for i, mesh in enumerate(meshes)
     ]
     walls = {name: matt(textures[i % 4], (0.5, 0.35, 0.25), 1.0, 20.0 * i) for i, name in enumerate(WALLS)}
+    walls["floor"] = replace(walls["floor"], patched=True)
     return Scene(
         0,
         "full",

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from fsid.assets import BACKGROUND_PARTS, build_mesh, material_families, mesh_families, registry
+from fsid.assets import BACKGROUND_PARTS, build_mesh, material_families, mesh_families, part_kind, registry
 from fsid.assets.solids import box, rotation_matrix
 from fsid.errors import FsidError
 from fsid.scene import (
@@ -25,6 +25,7 @@ from fsid.scene import (
 )
 from fsid.scene.choice import power_law_rand
 from fsid.scene.materials import PLAIN
+from fsid.scene.pools import GROWN, NATURE
 from fsid.scene.relief import Relief, surface_points
 from fsid.scene.sources import mesh_rand, texture_rand
 from fsid.scene.surroundings import space_of
@@ -315,9 +316,45 @@ def test_every_family_is_used():
     assert drawn == set(material_families())
 
 
+def test_out_of_doors_things_have_grown_and_elsewhere_nothing_changes():
+    outdoors = dataclasses.replace(CONFIG, background=BackgroundConfig(kind_shares=(0, 0, 0, 1)))
+    indoors = dataclasses.replace(CONFIG, background=BackgroundConfig(kind_shares=(1, 0, 0, 0)))
+    drawn = [o for seed in SEEDS for o in scene(seed, config=outdoors).objects]
+    assert 0.5 < np.mean([o.family in NATURE for o in drawn]) < 0.85
+    for seed in SEEDS:
+        bare = dataclasses.replace(outdoors, nature_share=0.0)
+        inside, without, wild = (scene(seed, config=c) for c in (indoors, bare, outdoors))
+        assert [o.seed for o in wild.objects] == [o.seed for o in without.objects]
+        assert inside.objects == without.objects
+        assert scene(seed, "materials", outdoors).objects == scene(0, "materials", indoors).objects
+        for o, materials in zip(wild.objects, wild.materials, strict=True):
+            for name, material in zip(build_mesh(o.family, o.seed).part_names, materials, strict=True):
+                if o.family in NATURE and part_kind(name) in GROWN:
+                    assert material.family.split("+")[0] in GROWN[part_kind(name)]
+
+
+def test_what_is_far_lies_behind_the_rest_as_the_camera_sees_it():
+    far = PlacementConfig(far_share=1.0, floating_share=0.0)
+    outdoors = BackgroundConfig(kind_shares=(0, 0, 0, 1))
+    config = dataclasses.replace(CONFIG, repeat_share=0.0, placement=far, background=outdoors)
+    distances = []
+    for seed in SEEDS:
+        s = scene(seed, config=config)
+        eye, target = np.array(s.cameras[0].position_m), np.array(s.cameras[0].target_m)
+        ahead, offsets = target - eye, (boxes(s).mean(1) - eye)[:, :2]
+        cosine = (offsets @ ahead[:2]) / np.linalg.norm(offsets, axis=1) / np.linalg.norm(ahead[:2])
+        assert np.mean(cosine > np.cos(1.0)) > 0.9
+        distances += list(np.linalg.norm(offsets, axis=1))
+    assert np.quantile(distances, 0.9) > 8
+
+
 def test_surface_colours_keep_their_limits_and_stay_moderate():
     """Albedo within its limits; HSV-like saturation of real photographs: mean around a third."""
-    drawn = dataclasses.replace(CONFIG, materials=MaterialConfig(natural_share=0.0, lobe_share=0.0))
+    drawn = dataclasses.replace(
+        CONFIG,
+        background=BackgroundConfig(kind_shares=(1, 0, 0, 0)),
+        materials=MaterialConfig(natural_share=0.0, lobe_share=0.0),
+    )
     scenes = [scene(seed, config=drawn) for seed in SEEDS]
     colours = np.array([c for s in scenes for ms in s.materials for m in ms for c in m.colours])
     assert colours.min() >= CONFIG.materials.albedo[0]

@@ -41,7 +41,7 @@ SURFACE = np.dtype(
         ("transmission", "f4"),
         ("object_id", "f4"),
         ("thickness_m", "f4"),
-        ("padding", "f4"),
+        ("patched", "f4"),
     ]
 )
 """Ten texels of `struct Surface` in shaders/surfaces.glsl; object_id is one more than the frame's."""
@@ -162,6 +162,7 @@ def _surface(drawable: Drawable, material: Material, layer: Layer, time_s: float
     surface["emission"] = material.emission
     surface["transmission"] = material.transmission
     surface["object_id"] = drawable.object_id + 1
+    surface["patched"] = material.patched
     surface["thickness_m"] = (
         _GLASS_SHARE * np.ptp(drawable.mesh.vertices, axis=0).min() * min(drawable.transform.scale)
     )

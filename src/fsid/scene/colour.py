@@ -29,7 +29,7 @@ _NATURAL_SHARES = (0.13, 0.16, 0.19, 0.24, 0.18, 0.05, 0.03, 0.02)
 class Mood(NamedTuple):
     """What the colours of one scene share, as those of one photograph do.
 
-    hue_deg: CIELAB hue that the harmonised palette keeps to. hues_deg: three to five of the natural hues.
+    hue_deg: CIELAB hue that the harmonised palette keeps to. hues_deg: two to four of the natural hues.
     chroma: factor on all chromas but lab's. variation: of chromaticity within one material, 0 none .. 1 all.
     """
 
@@ -41,7 +41,7 @@ class Mood(NamedTuple):
 
 def mood_rand(rng: np.random.Generator, calm_share: float, variation: tuple[float, float]) -> Mood:
     """Hues, how colourful the scene is (mostly muted), and how far its textures vary in colour."""
-    hue_deg, count = float(rng.uniform(0, 360)), int(rng.integers(3, 6))
+    hue_deg, count = float(rng.uniform(0, 360)), int(rng.integers(2, 5))
     hues_deg = rng.choice(_NATURAL_HUES_DEG, 5, replace=False, p=_NATURAL_SHARES) + rng.normal(0, 10, 5)
     chroma = float(np.exp(rng.normal(0.0, 0.6)))
     varied, left = rng.random() < 1 - calm_share, float(rng.uniform(*variation))

@@ -26,9 +26,9 @@ class PlacementConfig:
     """p of the density of sizes, r^-p: 1 is log-uniform, 3 that of dead leaves (scale invariance in 2-D)."""
     spread_m: float = knob(1.1, 0.3, 20.0)
     """Objects lie within this distance of the focus: with the count N, their density."""
-    far_share: float = knob(0.2, 0.0, 1.0)
-    """Share of objects farther away, larger in proportion: what is seen behind and beside the others."""
-    far_factor: float = knob(5.0, 1.0, 100.0)
+    far_share: float = knob(0.3, 0.0, 1.0)
+    """Share of objects farther away, larger in proportion: what is seen behind the others."""
+    far_factor: float = knob(15.0, 1.0, 100.0)
     """Largest distance of these relative to `spread_m`; walls keep them nearer."""
     floating_share: float = knob(0.3, 0.0, 1.0)
     """Share of objects in the air instead of at rest on the ground or on each other."""
@@ -61,7 +61,7 @@ class MaterialConfig:
     """How far the colours of one material may lie apart: 1 as drawn, 0 all alike."""
     natural_share: float = knob(0.4, 0.0, 1.0)
     """Share of materials in the colours that their family has in nature, where it has some."""
-    calm_share: float = knob(0.2, 0.0, 1.0)
+    calm_share: float = knob(0.4, 0.0, 1.0)
     """Share of scenes whose textures vary in light and dark more than in colour."""
     variation: Range = knob((0.15, 0.8), 0.0, 1.0)
     """How much of the colour differences within one material is left in those scenes."""
@@ -148,6 +148,8 @@ class SceneConfig:
     """N, number of objects, both ends included."""
     repeat_share: float = knob(0.5, 0.0, 1.0)
     """Share of objects that are copies of another one, in the same materials, near it: heaps, rows, sets."""
+    nature_share: float = knob(0.6, 0.0, 1.0)
+    """Share of objects out of doors that have grown there: bushes, stones, leaves, in their own colours."""
     backgrounds: int = knob(0, 0, 10**6)
     """K, number of different backgrounds in all scenes; 0 gives every scene its own."""
     mesh_families: tuple[str, ...] = ()

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
+from types import MappingProxyType
 
 import numpy as np
 
@@ -13,6 +15,7 @@ from fsid.assets import (
     material_families,
     material_layers,
     material_tile_m,
+    part_kind,
 )
 from fsid.scene.choice import log_uniform_rand, pick_rand
 from fsid.scene.colour import PALETTES, Mood, albedo_rgb, calmed, lab_rand, related_rand
@@ -20,8 +23,8 @@ from fsid.scene.config import SceneConfig
 from fsid.scene.knobs import Range
 from fsid.scene.lobes import lobes_rand
 from fsid.scene.model import Material, Vec3
-from fsid.scene.pools import OFTEN_PLAIN, POOLS
-from fsid.scene.sources import FILE, texture_rand
+from fsid.scene.pools import OFTEN_PLAIN, POOLS, WITHOUT_ORDER
+from fsid.scene.sources import FILE, Names, texture_rand
 from fsid.scene.vectors import vec3
 
 PLAIN_FAMILY = "paint"
@@ -38,11 +41,29 @@ PLAIN = Material(
 """The one plain default material of variant v1 ("objects")."""
 
 
-def material_rand(rng: np.random.Generator, config: SceneConfig, mood: Mood, part_name: str) -> Material:
-    """The material of an object's part; its name may say what it is made of (`fsid.assets.part_kind`)."""
+def material_rand(
+    rng: np.random.Generator,
+    config: SceneConfig,
+    mood: Mood,
+    part_name: str,
+    pools: Mapping[str, Names] = MappingProxyType({}),
+) -> Material:
+    """The material of an object's part; its name may say what it is made of (`fsid.assets.part_kind`).
+
+    pools: kind -> families that such a part has in its own colours; for other kinds anything goes.
+    """
     plain, family = rng.random() < config.materials.plain_share, texture_rand(rng, config)
+    pool = pools.get(part_kind(part_name) or "", ())
+    pool = tuple(name for name in pool if name in (config.material_families or pool))
+    if pool and not family.startswith(FILE):
+        plain, family = False, pick_rand(rng, pool)
     material = _finished_rand(
-        rng, config, mood, PLAIN_FAMILY if plain else family, config.materials.tile_scale
+        rng,
+        config,
+        mood,
+        PLAIN_FAMILY if plain else family,
+        config.materials.tile_scale,
+        in_nature=bool(pool),
     )
     return lobes_rand(rng, config.materials, material, part_name)
 
@@ -58,21 +79,28 @@ def surface_rand(rng: np.random.Generator, config: SceneConfig, mood: Mood, surf
         family = common
     family = PLAIN_FAMILY if plain else family
     material = _finished_rand(rng, config, mood, family, config.background.tile_scale)
+    material = replace(material, patched=family in WITHOUT_ORDER)
     aligned, quarter = rng.random() < config.background.aligned_share, int(rng.integers(4))
     return replace(material, rotation_deg=90.0 * quarter) if aligned else material
 
 
 def _finished_rand(
-    rng: np.random.Generator, config: SceneConfig, mood: Mood, family: str, tile_scale: Range
+    rng: np.random.Generator,
+    config: SceneConfig,
+    mood: Mood,
+    family: str,
+    tile_scale: Range,
+    *,
+    in_nature: bool = False,
 ) -> Material:
-    """`family` in random colours, size and relief."""
+    """`family` in random colours, size and relief. in_nature: always in its own colours, where it has any."""
     knobs = config.materials
     variant = int(rng.integers(MATERIAL_VARIANTS))
     layered, layer = rng.random() < knobs.layer_share, pick_rand(rng, material_layers())
     natural, colours = rng.random() < knobs.natural_share, _colours_rand(rng, config, mood)
     from_file = family.startswith(FILE)
-    in_nature = _colours_of(family, variant) if natural or from_file else None
-    own = np.array(in_nature or colours)
+    known = _colours_of(family, variant) if natural or in_nature or from_file else None
+    own = np.array(known or colours)
     a, b, c = own if from_file else calmed(own, mood.variation)
     return Material(
         family=f"{family}+{layer}" if layered and family != PLAIN_FAMILY else family,

@@ -39,7 +39,8 @@ class Material:
     sheen: 0..1, weight of the fuzz of cloth. translucency: 0..1, share of the diffuse light that leaves on
     the other side (leaves, paper, lamp shades). transmission: 0..1, share of light that passes through as
     through clear glass of index 1.5, tinted by the albedo. emission: radiance of the surface = emission x
-    albedo, on top of what it reflects.
+    albedo, on top of what it reflects. patched: laid in patches from random places of the tile, so that
+    nothing repeats: for matter without order, grass and gravel and plaster.
     """
 
     family: str
@@ -55,6 +56,7 @@ class Material:
     translucency: float = 0.0
     transmission: float = 0.0
     emission: float = 0.0
+    patched: bool = False
 
 
 @dataclass(frozen=True)

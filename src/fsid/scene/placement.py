@@ -33,6 +33,8 @@ _CLEARANCE = 0.75
 """An object's bounding sphere stays smaller than this part of its distance to a camera or light."""
 _PILE_LIMIT_M = 0.6
 """Things come to rest on others whose top is lower than this."""
+_FAR_ANGLE = 0.7
+"""Radians to either side of the camera's direction within which the far objects lie."""
 _SINK = 0.01
 """Part of its size by which a resting object sinks in: contact has no gap."""
 
@@ -83,7 +85,7 @@ def scattered(
     relief = Relief(space)
     first: dict[Object, tuple[np.ndarray, float]] = {}
     for rng, S in zip(rngs, objects, strict=True):
-        draw = _draw_rand(rng, space, focus_m, config)
+        draw = _draw_rand(rng, space, focus_m, focus_m - keep_clear_m[0], config)
         if S in first:
             draw = _beside(draw, *first[S], focus_m, space, config)
         points = surface_points(S.family, S.seed)
@@ -101,7 +103,10 @@ def scattered(
     return out
 
 
-def _draw_rand(rng: np.random.Generator, space: Space, focus_m: np.ndarray, config: PlacementConfig) -> _Draw:
+def _draw_rand(
+    rng: np.random.Generator, space: Space, focus_m: np.ndarray, ahead: np.ndarray, config: PlacementConfig
+) -> _Draw:
+    """ahead: (3,) from the camera to the focus; what is far lies behind the rest as seen from there."""
     turn_deg = rng.integers(config.rotation_steps, size=3) * (360.0 / config.rotation_steps)
     size_m = power_law_rand(rng, config.size_m, config.size_exponent)
     stretch = np.array([log_uniform_rand(rng, config.stretch) for _ in range(3)])
@@ -111,8 +116,12 @@ def _draw_rand(rng: np.random.Generator, space: Space, focus_m: np.ndarray, conf
     phi = rng.uniform(0, 2 * np.pi, _CANDIDATES)
     z = focus_m[2] + rng.normal(0.15, 0.4, _CANDIDATES)
     if far:
-        rho = rho * 0.5 + distance
-        size_m *= distance / config.spread_m
+        phi = np.arctan2(ahead[1], ahead[0]) + _FAR_ANGLE * (phi / np.pi - 1)
+        ways = np.stack([np.cos(phi), np.sin(phi), np.zeros(_CANDIDATES)], axis=1)
+        wanted = rho * 0.5 + distance
+        rho = np.array([space.reach(focus_m, way, far_m) for way, far_m in zip(ways, wanted, strict=True)])
+        scale = max(float(np.median(rho)) / config.spread_m, 1.0)
+        size_m, z = size_m * scale, focus_m[2] + (z - focus_m[2]) * scale
     spots = np.c_[focus_m[0] + rho * np.cos(phi), focus_m[1] + rho * np.sin(phi), z]
     return _Draw(turn_deg, size_m, stretch, bool(floating), np.clip(spots, space.low, space.high))
 

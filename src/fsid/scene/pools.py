@@ -1,7 +1,7 @@
-"""Which material families suit which surface of a background: floors are planks, walls are plaster ...
+"""Which families suit which place: floors are planks, walls are plaster, and out of doors things have grown.
 
-A pool only tilts the odds (`BackgroundConfig.pool_share`): the rest is drawn from all families, because a
-denoiser should see every texture in every place.
+A pool only tilts the odds (`BackgroundConfig.pool_share`, `SceneConfig.nature_share`): the rest is drawn from
+all families, because a denoiser should see every texture in every place.
 """
 
 from __future__ import annotations
@@ -28,6 +28,21 @@ _GROUND = (
     *("asphalt", "cobblestones", "moss", "soil", "snow", "straw", "sandstone", "slate", "foliage"),
 )
 
+NATURE = (
+    *("bush", "bush", "bush", "branch", "branch", "tuft", "tuft", "stones", "stones", "flower", "rosette"),
+    *("fallen_leaves", "logs", "mushrooms", "pine_cones", "potted_plant", "cactus", "seashells"),
+)
+"""Mesh families that are common out of doors, as often as they stand here."""
+
+GROWN: dict[str, tuple[str, ...]] = {
+    "leaf": ("leaves", "moss", "grass", "foliage", "dead_leaves"),
+    "petal": ("flowers", "gradient", "satin"),
+    "wood": ("bark",),
+    "stone": ("granite", "sandstone", "slate", "moss", "concrete"),
+    "soil": ("soil", "gravel", "dead_leaves"),
+}
+"""Kind of an object's part (`fsid.assets.PART_KINDS`) -> material families that are common out of doors."""
+
 POOLS: dict[str, tuple[str, ...]] = {
     "floor": _FLOOR,
     "ceiling": _CEILING,
@@ -37,6 +52,47 @@ POOLS: dict[str, tuple[str, ...]] = {
     "ground": _GROUND,
 }
 """Part of a background -> families that are common there."""
+
+WITHOUT_ORDER = frozenset(
+    (
+        *(
+            "asphalt",
+            "bread",
+            "carpet",
+            "cast_metal",
+            "concrete",
+            "copper_patina",
+            "coral",
+            "cork",
+            "dead_leaves",
+        ),
+        *("felt", "flowers", "foam", "foliage", "fur", "galvanised", "grains", "granite", "grass", "gravel"),
+        *(
+            "leaves",
+            "marble",
+            "moss",
+            "peeling_paint",
+            "plaster",
+            "plywood",
+            "rusty_metal",
+            "sand",
+            "sandstone",
+        ),
+        *(
+            "scratched_metal",
+            "skin",
+            "snow",
+            "soil",
+            "straw",
+            "suede",
+            "terrazzo",
+            "terry",
+            "velour",
+            "water",
+        ),
+    )
+)
+"""Material families that backgrounds show without repetition (`Material.patched`)."""
 
 OFTEN_PLAIN = frozenset({"ceiling", "wall_north", "wall_south", "wall_east", "wall_west", "sweep"})
 """Parts that `BackgroundConfig.plain_share` speaks of."""

@@ -22,6 +22,7 @@ import numpy as np
 
 from fsid.assets import build_mesh
 from fsid.errors import FsidError
+from fsid.scene.choice import pick_rand
 from fsid.scene.colour import Mood
 from fsid.scene.config import SceneConfig
 from fsid.scene.lens import lens_rand
@@ -29,7 +30,8 @@ from fsid.scene.lights import lighting_rand
 from fsid.scene.materials import PLAIN, material_rand
 from fsid.scene.model import Camera, Material, Object, Scene, Transform
 from fsid.scene.placement import arranged, scattered
-from fsid.scene.sources import mesh_rand, sky_rand
+from fsid.scene.pools import GROWN, NATURE
+from fsid.scene.sources import FILE, mesh_rand, sky_rand
 from fsid.scene.surroundings import Space, background_rand, space_of
 from fsid.scene.view import burst_rand, camera_rand, motions_rand, rig_rand
 
@@ -54,6 +56,7 @@ class Streams(NamedTuple):
     motion: np.random.SeedSequence
     lens: np.random.SeedSequence
     sky: np.random.SeedSequence
+    nature: np.random.SeedSequence
 
 
 def sample(
@@ -66,15 +69,17 @@ def sample(
     _check(seed, width, height, variant)
     streams, fixed = _streams(seed), _streams(_FIXED_SEED)
     B, mood = background_rand(np.random.default_rng(streams.B), config)
-    space = space_of(B)
+    space, outdoors = space_of(B), B.kind == "open-air"
     view, focus = camera_rand(np.random.default_rng(streams.camera), config.camera, space, width, height)
     cameras = _cameras_rand(streams, config, view)
-    sky_source = sky_rand(np.random.default_rng(streams.sky), config) if B.kind == "open-air" else None
+    sky_source = sky_rand(np.random.default_rng(streams.sky), config) if outdoors else None
     lighting = lighting_rand(
         streams.lights, config.lights, space, focus, np.array(view.position_m), sky_source
     )
     S = _objects_rand(fixed.S if variant == "materials" else streams.S, config)
-    M = _materials_rand(streams.M, S, config, mood, plain=variant == "objects")
+    if outdoors and variant != "materials":
+        S = _grown_rand(streams.nature, S, config)
+    M = _materials_rand(streams.M, S, config, mood, plain=variant == "objects", outdoors=outdoors)
     if variant == "full":
         places = [light.position_m for light in lighting.lights if light.kind != "sun"]
         keep_clear = np.array([view.position_m, *(camera.position_m for camera in cameras), *places])
@@ -112,8 +117,28 @@ def _objects_rand(stream: np.random.SeedSequence, config: SceneConfig) -> tuple[
     return tuple(out)
 
 
+def _grown_rand(
+    stream: np.random.SeedSequence, objects: Sequence[Object], config: SceneConfig
+) -> tuple[Object, ...]:
+    """`objects` with a share of them, and their copies, grown out of doors."""
+    out: dict[Object, Object] = {}
+    for S, child in zip(objects, stream.spawn(len(objects)), strict=True):
+        if S not in out:
+            rng = np.random.default_rng(child)
+            wild, family = rng.random() < config.nature_share, pick_rand(rng, NATURE)
+            known = not config.mesh_families or family in config.mesh_families
+            out[S] = Object(family, S.seed) if wild and known and not S.family.startswith(FILE) else S
+    return tuple(out[S] for S in objects)
+
+
 def _materials_rand(
-    stream: np.random.SeedSequence, objects: Sequence[Object], config: SceneConfig, mood: Mood, *, plain: bool
+    stream: np.random.SeedSequence,
+    objects: Sequence[Object],
+    config: SceneConfig,
+    mood: Mood,
+    *,
+    plain: bool,
+    outdoors: bool,
 ) -> tuple[tuple[Material, ...], ...]:
     """One material per part, alike for copies; one stream per object, so that its number of parts disturbs no
     other."""
@@ -121,7 +146,10 @@ def _materials_rand(
     for S, child in zip(objects, stream.spawn(len(objects)), strict=True):
         if S not in out:
             names, rng = build_mesh(S.family, S.seed).part_names, np.random.default_rng(child)
-            out[S] = tuple(PLAIN if plain else material_rand(rng, config, mood, name) for name in names)
+            pools = GROWN if outdoors and S.family in NATURE else {}
+            out[S] = tuple(
+                PLAIN if plain else material_rand(rng, config, mood, name, pools) for name in names
+            )
     return tuple(out[S] for S in objects)
 
 

@@ -61,7 +61,8 @@ def _read(kind: Any, data: Any, where: str) -> Any:
         number = isinstance(data, int | float) and not isinstance(data, bool)
         _expect(number and math.isfinite(data), where, "a finite number")
         return float(data)
-    _expect(isinstance(data, kind) and not isinstance(data, bool), where, f"of type {kind.__name__}")
+    is_kind = isinstance(data, kind) and isinstance(data, bool) == (kind is bool)
+    _expect(is_kind, where, f"of type {kind.__name__}")
     return data
 
 

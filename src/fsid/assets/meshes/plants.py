@@ -169,6 +169,32 @@ def branch(rng: np.random.Generator) -> Parts:
     return parts
 
 
+@mesh_family("bush")
+def bush(rng: np.random.Generator) -> Parts:
+    """Crown of one or two hundred leaves about a stem that forks: shrub, small tree, bouquet of foliage."""
+    count, length = int(rng.integers(110, 230)), rng.uniform(0.05, 0.14)
+    t = np.linspace(0, 1, 5)
+    half = (
+        rng.uniform(0.5, 1.2)
+        * (_oval(t), 0.3 * np.sin(np.pi * t), 0.55 * np.sqrt(t) * (1 - t) ** 0.7)[int(rng.integers(3))]
+    )
+    leaf = _grid_leaf(half + 0.03, rng.uniform(0.1, 0.5), rng.uniform(0.1, 0.6), 3, length)
+    ways = rng.normal((0, 0, rng.uniform(0, 0.8)), 1, (count, 3))
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    lumps = rng.normal(0, 1, (6, 3)) @ ways.T
+    depth = (0.75 + 0.15 * np.tanh(lumps.max(axis=0) - 1)) * rng.uniform(0.2, 1, count) ** (1 / 3)
+    crown = rng.uniform(0.16, 0.34, 3)
+    high = crown[2] * rng.uniform(0.9, 1.8)
+    spots = ways * depth[:, None] * crown + (0, 0, high)
+    aim = ways + rng.normal(0, 0.6, (count, 3)) - (0, 0, rng.uniform(0, 0.8))
+    turns = turns_to(aim, rng.uniform(0, 2 * np.pi, count)) * rng.uniform(0.6, 1.25, count)[:, None, None]
+    s = np.linspace(0, 1, 6)[None, :, None]
+    ends = spots[: int(rng.integers(12, 30)), None]
+    middle = ends * (0.25, 0.25, 0.6) + rng.normal(0, 0.01, (len(ends), 1, 3))
+    stems = tubes(2 * s * (1 - s) * middle + s**2 * ends, np.linspace(0.008, 0.002, 6), 6)
+    return {"wood_bark": [stems], "leaf": [copies(leaf.turned(y_deg=-90), turns, spots)]}
+
+
 @mesh_family("mushrooms")
 def mushrooms(rng: np.random.Generator) -> Parts:
     """Group of caps on stalks, with gills below and sometimes warts above."""

@@ -20,7 +20,10 @@ from fsid.scene.model import Material
 BLEND = 0.2
 MIN_ROUGHNESS = 0.18
 MAX_PROBES = 4
+PATCHES = 1.5
+_LEAST_SHARE = 0.01
 _OFFSET = np.array([0.37, 0.61])
+_MASK = np.uint64(0xFFFFFFFF)
 
 
 @dataclass(frozen=True)
@@ -119,11 +122,46 @@ def _probe(
     along = axes[..., 0] * longest[:, None]
     probes = np.clip(np.ceil(longest / across - 0.5), 1, MAX_PROBES)
     total = np.zeros((len(uv), 8), np.float32)
-    for k in range(MAX_PROBES):
-        at = np.flatnonzero(probes > k)
-        step = along[at] * ((k + 0.5) / probes[at] - 0.5)[:, None]
-        total[at] += pyramid.look_up(uv[at] + step, longest[at] / probes[at])
-    return total / probes[:, None]
+    for share, cut in _patches(uv) if material.patched else [(np.ones(len(uv)), np.zeros_like(uv))]:
+        for k in range(MAX_PROBES):
+            at = np.flatnonzero((probes > k) & (share > 0))
+            step = along[at] * ((k + 0.5) / probes[at] - 0.5)[:, None]
+            found = pyramid.look_up(uv[at] + cut[at] + step, longest[at] / probes[at])
+            total[at] += (share[at] / probes[at]).astype(np.float32)[:, None] * found
+    return total
+
+
+def _patches(uv: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """The three patches about uv (N, 2): the share of each (N,), and where in the tile it is cut out (N, 2).
+
+    The patches are the corners of a grid of equilateral triangles of edge 1 / (PATCHES sin 60), their shares
+    the eighth powers of barycentric coordinates (after Heitz and Neyret 2018).
+    """
+    x, y = PATCHES * uv.T
+    across, up = x - y / np.sqrt(3), y / np.sin(np.pi / 3)
+    column, row = np.floor(across).astype(np.int64), np.floor(up).astype(np.int64)
+    a, b = across - column, up - row
+    upper = a + b > 1
+    near = np.where(upper, [a + b - 1, 1 - b, 1 - a], [1 - a - b, b, a]) ** 8
+    near = np.where(near / near.sum(0) > _LEAST_SHARE, near, 0.0)
+    places = [
+        _place(column + np.where(upper, *right), row + np.where(upper, *above))
+        for right, above in (((1, 0), (1, 0)), ((1, 0), (0, 1)), ((0, 1), (1, 0)))
+    ]
+    return list(zip(near / near.sum(0), places, strict=True))
+
+
+def _place(column: np.ndarray, row: np.ndarray) -> np.ndarray:
+    """(N, 2) in 0..1 for every patch: pcg2d of Jarzynski and Olano 2020."""
+    x, y = (
+        (part.astype(np.uint64) & _MASK) * np.uint64(1664525) + np.uint64(1013904223)
+        for part in (column, row)
+    )
+    for _ in range(2):
+        x = (x + (y & _MASK) * np.uint64(1664525)) & _MASK
+        y = (y + x * np.uint64(1664525)) & _MASK
+        x, y = x ^ (x >> np.uint64(16)), y ^ (y >> np.uint64(16))
+    return np.stack([x, y], axis=-1).astype(np.uint64) / 2.0**32
 
 
 def _face_axes(axis: int, side: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

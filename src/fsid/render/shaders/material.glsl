@@ -10,6 +10,9 @@ const float SLOPE_LEVELS = 127.0;
 const float DETAIL = 2.0 * 255.0 / 254.0;  // neutral detail is stored exactly
 const float SHARPEN = 0.75;       // of the footprint: a trilinear probe is wider than a pixel
 
+const float PATCHES = 1.5;        // per edge of a tile
+const float LEAST_SHARE = 0.01;   // of a patch that is looked up
+
 struct Matter {
     vec3 albedo;
     vec3 normal;      // world, with relief
@@ -26,6 +29,18 @@ void face_axes(int axis, float side, out vec3 u, out vec3 v) {
 vec3 into(vec3 rows[3], vec3 world) { return world.x * rows[0] + world.y * rows[1] + world.z * rows[2]; }
 vec3 out_of(vec3 rows[3], vec3 v) { return vec3(dot(rows[0], v), dot(rows[1], v), dot(rows[2], v)); }
 
+// A place of the tile for every patch: pcg2d of Jarzynski and Olano 2020.
+vec2 place_of(ivec2 patch_index) {
+    uvec2 v = uvec2(patch_index) * 1664525u + 1013904223u;
+    v.x += v.y * 1664525u;
+    v.y += v.x * 1664525u;
+    v ^= v >> 16u;
+    v.x += v.y * 1664525u;
+    v.y += v.x * 1664525u;
+    v ^= v >> 16u;
+    return vec2(v >> 8u) / 16777216.0;
+}
+
 // A pixel's footprint has the second moments of the ellipse whose axes are those of (gx gy), however gx and gy
 // lie to each other (Heckbert 1989): the longer one, and the length of the shorter.
 vec2 longest_axis(vec2 gx, vec2 gy, out float shorter) {
@@ -34,6 +49,23 @@ vec2 longest_axis(vec2 gx, vec2 gy, out float shorter) {
     vec2 share = lx >= ly ? vec2(most - ly + 1e-30, both) : vec2(both, most - lx + 1e-30);
     shorter = abs(gx.x * gy.y - gx.y * gy.x) * inversesqrt(max(most, 1e-30));
     return (share.x * gx + share.y * gy) * inversesqrt(max(dot(share, share), 1e-36));
+}
+
+// Patches of a texture without order, from random places of its tile (Heitz and Neyret 2018): the three patches
+// around uv, corners of a grid of triangles, with their share of it, and where in the tile each is cut out.
+void patches_at(vec2 uv, out vec3 share, out vec2 cut[3]) {
+    vec2 skewed = mat2(1.0, 0.0, -0.57735027, 1.15470054) * (uv * PATCHES);
+    ivec2 corner = ivec2(floor(skewed));
+    vec2 f = skewed - vec2(corner);
+    bool upper = f.x + f.y > 1.0;
+    share = upper ? vec3(f.x + f.y - 1.0, 1.0 - f.y, 1.0 - f.x) : vec3(1.0 - f.x - f.y, f.y, f.x);
+    share *= share;
+    share *= share;
+    share *= share;
+    share /= share.x + share.y + share.z;
+    cut[0] = place_of(corner + (upper ? ivec2(1, 1) : ivec2(0, 0)));
+    cut[1] = place_of(corner + (upper ? ivec2(1, 0) : ivec2(0, 1)));
+    cut[2] = place_of(corner + (upper ? ivec2(0, 1) : ivec2(1, 0)));
 }
 
 // position, normal: world. dx, dy: from this pixel's position to those of its neighbours.
@@ -66,15 +98,26 @@ Matter matter_at(Surface s, vec3 position, vec3 normal, vec3 dx, vec3 dy) {
         float longest = SHARPEN * length(along), across = max(SHARPEN * reach, 1e-8);
         int probes = int(clamp(ceil(longest / across - 0.25), 1.0, max_probes));
         float level = log2(max(longest / float(probes), across) * texels);
+        vec3 share = vec3(1.0, 0.0, 0.0);
+        vec2 cut[3] = vec2[](vec2(0.0), vec2(0.0), vec2(0.0));
+        if (s.patched) patches_at(uv, share, cut);
         vec4 m = vec4(0), r = vec4(0);
-        int k = 0;
+        float found = 0.0;
+        int patch_index = 0, patch_count = s.patched ? 3 : 1;
         do {
-            vec3 probe = vec3(uv + along * ((float(k) + 0.5) / float(probes) - 0.5), s.layer);
-            m += textureLod(masks, probe, level);
-            r += textureLod(relief, probe, level);
-        } while (++k < probes);
-        m /= float(probes);
-        r /= float(probes);
+            float part = share[patch_index] / float(probes);
+            int k = 0, count = share[patch_index] > LEAST_SHARE ? probes : 0;
+            while (k < count) {
+                vec2 step = along * ((float(k) + 0.5) / float(probes) - 0.5);
+                vec3 probe = vec3(uv + cut[patch_index] + step, s.layer);
+                m += part * textureLod(masks, probe, level);
+                r += part * textureLod(relief, probe, level);
+                found += part;
+                ++k;
+            }
+        } while (++patch_index < patch_count);
+        m /= found;
+        r /= found;
         vec2 slope = (r.xy * 255.0 - 128.0) / SLOPE_LEVELS * s.slope_scale;
         mask += weight[axis] * m;
         other += weight[axis] * r;

@@ -15,6 +15,7 @@ struct Surface {
     float emission;     // radiance per albedo
     int object_id;      // one more than in the frame
     float thickness_m;  // of glass
+    bool patched;       // nothing repeats
 };
 
 Surface surface_at(int i) {
@@ -42,5 +43,6 @@ Surface surface_at(int i) {
     s.transmission = t[9].x;
     s.object_id = int(t[9].y);
     s.thickness_m = t[9].z;
+    s.patched = t[9].w > 0.5;
     return s;
 }
