@@ -153,7 +153,7 @@ def test_v4_floats_as_often_as_configured():
 def floating(share):
     """Without tables: what misses one lies on the floor below."""
     background = BackgroundConfig(kind_shares=(0.6, 0.1, 0.0, 0.3))
-    placement = PlacementConfig(floating_share=share, far_share=0.0)
+    placement = PlacementConfig(floating_share=share, far_share=0.0, size_m=(0.06, 0.4), spread_m=1.5)
     return dataclasses.replace(
         CONFIG, mesh_families=("toy_blocks", "mug"), placement=placement, background=background
     )

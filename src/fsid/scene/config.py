@@ -20,17 +20,17 @@ from fsid.scene.knobs import Range, check_knobs, knob, shares
 class PlacementConfig:
     """T: position, scale, rotation (variant full)."""
 
-    size_m: Range = knob((0.06, 1.6), 0.01, 10.0)
+    size_m: Range = knob((0.1, 1.2), 0.01, 10.0)
     """Largest side of an object after scaling."""
-    size_exponent: float = knob(1.8, 0.0, 6.0)
+    size_exponent: float = knob(1.2, 0.0, 6.0)
     """p of the density of sizes, r^-p: 1 is log-uniform, 3 that of dead leaves (scale invariance in 2-D)."""
-    spread_m: float = knob(1.1, 0.3, 20.0)
+    spread_m: float = knob(0.9, 0.3, 20.0)
     """Objects lie within this distance of the focus: with the count N, their density."""
     far_share: float = knob(0.3, 0.0, 1.0)
     """Share of objects farther away, larger in proportion: what is seen behind the others."""
     far_factor: float = knob(15.0, 1.0, 100.0)
     """Largest distance of these relative to `spread_m`; walls keep them nearer."""
-    floating_share: float = knob(0.3, 0.0, 1.0)
+    floating_share: float = knob(0.2, 0.0, 1.0)
     """Share of objects in the air instead of at rest on the ground or on each other."""
     rotation_steps: int = knob(20, 1, 360)
     """Number of equally spaced rotation angles per axis; 20 in the paper."""
