@@ -118,17 +118,29 @@ def _natural_light(seed: int) -> np.ndarray:
     return (light[..., None] * rng.uniform(0.6, 1.2, (1, 1, 3))).astype(np.float32)
 
 
-def test_exposure_clips_highlights_as_photographs_do_and_places_the_middle_where_it_says():
-    clipped, middle = [], []
-    for seed in range(60):
-        radiance = _natural_light(seed)
-        luminance = expose(np.random.default_rng(seed), radiance) @ SRGB_TO_XYZ[1]
-        clipped.append(np.mean(luminance > 1))
-        middle.append(np.median(luminance))
+def _exposed(seed):
+    """Share above saturation, and median, of the luminance of a frame."""
+    luminance = expose(np.random.default_rng(seed), _natural_light(seed)) @ SRGB_TO_XYZ[1]
+    return np.mean(luminance > 1), np.median(luminance)
+
+
+def test_exposure_clips_highlights_as_photographs_do_and_places_the_middle_where_it_says(monkeypatch):
+    monkeypatch.setattr("fsid.sensor.exposure.OVEREXPOSED_SHARE", 0.0)
+    clipped, middle = np.transpose([_exposed(seed) for seed in range(60)])
     assert 0.05 < max(clipped) <= 0.2505
     assert 0 < np.median(clipped) < 0.1
     assert max(middle) <= KEY_RANGE[1] + 1e-4
     assert np.median(middle) > 0.02
+
+
+def test_some_frames_are_overexposed_by_one_to_two_and_a_half_stops(monkeypatch):
+    usual = np.array([_exposed(seed)[1] for seed in range(200)])
+    monkeypatch.setattr("fsid.sensor.exposure.OVEREXPOSED_SHARE", 0.0)
+    times = usual / [_exposed(seed)[1] for seed in range(200)]
+    over = times > 1.01
+    assert 0.02 < over.mean() < 0.12
+    assert np.all((times[over] >= 1.99) & (times[over] <= 6.01))
+    np.testing.assert_allclose(times[~over], 1, rtol=1e-4)
 
 
 @settings(max_examples=20, deadline=None)
@@ -145,7 +157,7 @@ def test_a_black_frame_stays_black_and_a_mostly_black_one_is_exposed_for_its_lig
     assert np.all(expose(np.random.default_rng(0), black) == 0)
     lamp = np.zeros((20, 20, 3), np.float32)
     lamp[:5] = 50
-    assert (expose(np.random.default_rng(0), lamp) @ SRGB_TO_XYZ[1]).max() == pytest.approx(1, rel=1e-3)
+    assert (expose(np.random.default_rng(1), lamp) @ SRGB_TO_XYZ[1]).max() == pytest.approx(1, rel=1e-3)
 
 
 def test_white_balance_takes_a_part_of_what_tints_a_whole_frame_and_leaves_differences():
