@@ -106,14 +106,15 @@ Matter matter_at(Surface s, vec3 position, vec3 normal, vec3 dx, vec3 dy) {
         int patch_index = 0, patch_count = s.patched ? 3 : 1;
         do {
             float part = share[patch_index] / float(probes);
-            int k = 0, count = share[patch_index] > LEAST_SHARE ? probes : 0;
-            while (k < count) {
-                vec2 step = along * ((float(k) + 0.5) / float(probes) - 0.5);
-                vec3 probe = vec3(uv + cut[patch_index] + step, s.layer);
-                m += part * textureLod(masks, probe, level);
-                r += part * textureLod(relief, probe, level);
-                found += part;
-                ++k;
+            if (share[patch_index] > LEAST_SHARE) {
+                int k = 0;
+                do {
+                    vec2 step = along * ((float(k) + 0.5) / float(probes) - 0.5);
+                    vec3 probe = vec3(uv + cut[patch_index] + step, s.layer);
+                    m += part * textureLod(masks, probe, level);
+                    r += part * textureLod(relief, probe, level);
+                } while (++k < probes);
+                found += share[patch_index];
             }
         } while (++patch_index < patch_count);
         m /= found;
