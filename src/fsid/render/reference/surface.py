@@ -161,7 +161,7 @@ def _place(column: np.ndarray, row: np.ndarray) -> np.ndarray:
         x = (x + (y & _MASK) * np.uint64(1664525)) & _MASK
         y = (y + x * np.uint64(1664525)) & _MASK
         x, y = x ^ (x >> np.uint64(16)), y ^ (y >> np.uint64(16))
-    return np.stack([x, y], axis=-1).astype(np.uint64) / 2.0**32
+    return np.asarray(np.stack([x, y], axis=-1) / 2.0**32)
 
 
 def _face_axes(axis: int, side: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
