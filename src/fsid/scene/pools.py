@@ -54,9 +54,10 @@ POOLS: dict[str, tuple[str, ...]] = {
 """Part of a background -> families that are common there."""
 
 _UNORDERED = """
-    asphalt bread carpet cast_metal concrete copper_patina coral cork dead_leaves felt flowers foam foliage
-    fur galvanised grains granite grass gravel leaves marble moss peeling_paint plaster plywood rusty_metal sand
-    sandstone scratched_metal skin snow soil straw suede terrazzo terry velour water
+    asphalt bread carpet cast_metal concrete copper_patina coral cork dead_leaves felt flowers foam
+    foliage fur galvanised grains granite grass gravel leaves marble moss peeling_paint plaster
+    plywood rusty_metal sand sandstone scratched_metal skin snow soil straw suede terrazzo terry
+    velour water
 """
 WITHOUT_ORDER = frozenset(_UNORDERED.split())
 """Material families that backgrounds show without repetition (`Material.patched`)."""
