@@ -23,6 +23,7 @@ from fsid.errors import FsidError
 from fsid.render.buffers import Buffers
 from fsid.render.camera import lens_of
 from fsid.render.context import GlInfo, gl_info, open_context, return_large_blocks
+from fsid.render.drain import Drain
 from fsid.render.drawable import View, view_of
 from fsid.render.exposure import Shot, shots_of
 from fsid.render.flow import flow_between
@@ -90,6 +91,7 @@ class Renderer:
     def _prepare(self, texture_size: int) -> None:
         context, quality, grid = self._context, self._quality, self._grid
         self._texture_size = texture_size
+        self._drain = Drain(context)
         self._layers = LayerStore(context, texture_size)
         self._targets = Targets(context, grid)
         self._mirror_targets = Targets(context, grid)
@@ -201,6 +203,9 @@ class Renderer:
             self._draw_passes(stage, buffers, shot, self._mirror_targets if below is not None else None, mark)
         finally:
             buffers.release()
+            self._mirror_targets.release()
+            self._targets.release_glass()
+            self._drain.run()
 
     def _load_layers(self, view: View, bake: Bake) -> dict[tuple[str, int], Layer]:
         wanted = {(m.family, m.variant): None for d in view.drawables for m in d.materials}

@@ -150,19 +150,29 @@ class Targets:
 
     def read_frame(self) -> Frame:
         """The result, row 0 at the top."""
+        pixels = self.read_radiance()
+        radiance, depth = np.ascontiguousarray(pixels[..., :3]), pixels[..., 3].copy()
+        del pixels  # one image after the other: together they are the largest thing that a frame needs
+        depth[depth <= 0] = np.inf
+        labels = self._read_labels(0)
+        albedo, object_id = labels[..., :3] * np.float32(1 / _ID_LEVELS), labels[..., 3].astype(np.int32)
+        object_id -= 1
+        del labels
+        normal = self._read_labels(1)[..., :3] * np.float32(2 / _ID_LEVELS)
+        normal -= 1
+        return Frame(radiance, albedo, normal, depth, object_id)
+
+    def _read_labels(self, which: int) -> np.ndarray:
+        """(H, W, 4) uint16: 0 albedo and object id, 1 normal."""
         width, height = self.size
-        radiance = self.read_radiance()
-        albedo, normal = (
-            np.frombuffer(t.read(), np.uint16).reshape(height, width, 4) for t in self._results[0][2:]
-        )
-        depth = radiance[..., 3]
-        return Frame(
-            radiance=np.ascontiguousarray(radiance[..., :3]),
-            albedo=albedo[..., :3] * np.float32(1 / _ID_LEVELS),
-            normal=normal[..., :3] * np.float32(2 / _ID_LEVELS) - np.float32(1),
-            depth=np.where(depth > 0, depth, np.float32(np.inf)),
-            object_id=albedo[..., 3].astype(np.int32) - 1,
-        )
+        return np.frombuffer(self._results[0][2 + which].read(), np.uint16).reshape(height, width, 4)
+
+    def release_glass(self) -> None:
+        """Free what only `begin_glass` needs."""
+        for result in self._results[1:]:
+            for item in result:
+                item.release()
+        del self._results[1:]
 
     def release(self) -> None:
         """Free the images."""
@@ -170,6 +180,7 @@ class Targets:
             item.release()
         self._owned, self._results = [], []
         self._release_lit()
+        self.size = self.seen = (0, 0)
 
     def _result(self) -> list[Any]:
         """A framebuffer and its images: radiance and depth; albedo and object id; normal."""

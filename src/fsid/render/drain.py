@@ -1,0 +1,42 @@
+"""What was freed, given back: images by the driver that still holds them, blocks by the allocator.
+
+Mesa's llvmpipe draws into a row of scenes of its own. Each keeps what it has read until it is used again, and
+the first idle one is always taken: those at the end of the row, which only a busy moment reaches, hold images
+that were freed many frames ago. A busy moment made on purpose empties them all. Other drivers have nothing to
+give back, and what it costs them is not worth a distinction.
+"""
+
+from __future__ import annotations
+
+import ctypes
+
+import moderngl
+
+from fsid.render.programs import load_program
+
+_SCENES = 64
+"""Scenes in the row, at most (Mesa's MAX_SCENES)."""
+
+_BUSY_PX = 512
+
+
+class Drain:
+    """One slow image, and as many small ones waiting behind it as the row has scenes: milliseconds."""
+
+    def __init__(self, context: moderngl.Context) -> None:
+        self._context = context
+        self._slow = context.simple_framebuffer((_BUSY_PX, _BUSY_PX), 1)
+        self._small = [context.simple_framebuffer((1, 1), 1) for _ in range(2)]
+        program = load_program(context, "screen.vert", "busy.frag")
+        self._screen = context.vertex_array(program, [])
+
+    def run(self) -> None:
+        """Return when everything issued so far is done, and what has been freed is free."""
+        self._context.finish()
+        for target in [self._slow, *self._small * (_SCENES // 2)]:
+            target.use()
+            self._screen.render(moderngl.TRIANGLES, vertices=3)
+        self._context.finish()
+        trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # of glibc alone
+        if trim is not None:
+            trim(0)
