@@ -203,6 +203,7 @@ class Renderer:
             self._draw_passes(stage, buffers, shot, self._mirror_targets if below is not None else None, mark)
         finally:
             buffers.release()
+            self._shadows.release()
             self._mirror_targets.release()
             self._targets.release_glass()
             self._drain.run()
@@ -236,6 +237,9 @@ class Renderer:
         mark("occlusion")
         self._shadows.draw_blocks(targets, stage, buffers, shot)
         self._shade.draw(targets, stage, buffers, shot, self._layers, mirror=mirror)
+        if mirror is not None:
+            mirror.release()
+            self._drain.run()
         if stage.glass.any():
             self._samples.draw_glass(targets, stage, buffers, shot)
             self._shade.draw_glass(targets, stage, buffers, shot, self._layers)
