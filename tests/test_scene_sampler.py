@@ -141,6 +141,27 @@ def test_v4_rotates_by_the_papers_twenty_angles_per_axis():
         assert set(angles[:, axis]) == set(np.arange(20) * 18.0)
 
 
+def test_what_stands_upright_is_turned_about_the_vertical_alone():
+    """All draws are made either way, and what floats is turned freely."""
+    for floating_share in (0.0, 1.0):
+        free, upright = (
+            [
+                np.array(t.rotation_deg)
+                for seed in SEEDS
+                for t in scene(seed, config=standing(share, floating_share)).transforms
+            ]
+            for share in (0.0, 1.0)
+        )
+        kept = (0.0, 0.0, 1.0) if floating_share == 0 else (1.0, 1.0, 1.0)
+        np.testing.assert_array_equal(upright, np.array(free) * kept)
+        assert np.any(np.array(free)[:, :2])
+
+
+def standing(upright_share, floating_share):
+    placement = PlacementConfig(upright_share=upright_share, floating_share=floating_share)
+    return dataclasses.replace(CONFIG, placement=placement)
+
+
 def test_v4_floats_as_often_as_configured():
     """What rests is on the ground or on something low; what floats is mostly in the air."""
     spread = [boxes(scene(seed, config=floating(share)))[:, 0, 2] for share in (0.0, 1.0) for seed in SEEDS]

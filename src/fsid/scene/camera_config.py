@@ -91,7 +91,7 @@ class LensConfig:
     """Share with lateral chromatic aberration."""
     fringe: Range = knob((-0.0008, 0.0008), -0.02, 0.02)
     """Magnification of red and of blue relative to green, minus 1."""
-    soft_share: float = knob(0.33, 0.0, 1.0)
+    soft_share: float = knob(0.2, 0.0, 1.0)
     """Share whose lens is softer than the pixel grid; the rest is as sharp as its pixels."""
     softness_px: Range = knob((0.2, 0.9), 0.0, 20.0)
     """Standard deviation of the lens's point spread, pixels of the image."""

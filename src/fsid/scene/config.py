@@ -34,6 +34,8 @@ class PlacementConfig:
     """Share of objects in the air instead of at rest on the ground or on each other."""
     rotation_steps: int = knob(20, 1, 360)
     """Number of equally spaced rotation angles per axis; 20 in the paper."""
+    upright_share: float = knob(0.6, 0.0, 1.0)
+    """Share of the objects at rest that stand as they are used, turned about the vertical alone."""
     stretch: Range = knob((0.8, 1.25), 0.1, 10.0)
     """Extra scale per axis; log-uniform."""
 
@@ -127,13 +129,13 @@ class LightConfig:
     """Edges of an area light; log-uniform."""
     distance_m: Range = knob((0.9, 2.4), 0.1, 100.0)
     """Distance of a lamp from the focus."""
-    ambient_share: Range = knob((0.8, 4.0), 1e-4, 10.0)
+    ambient_share: Range = knob((1.5, 6.0), 1e-4, 10.0)
     """Irradiance from the surroundings relative to that from the lights; log-uniform."""
     sun_share: float = knob(0.6, 0.0, 1.0)
     """Share of open-air scenes with sunlight; the others have an overcast sky or, by `night_share`, lamps."""
     night_share: float = knob(0.1, 0.0, 1.0)
     """Share of open-air scenes that are lit by lamps under a dark sky."""
-    sun_to_sky: Range = knob((0.7, 5.0), 0.01, 100.0)
+    sun_to_sky: Range = knob((0.5, 3.0), 0.01, 100.0)
     """Irradiance of the sun relative to that of the sky; log-uniform."""
 
     def __post_init__(self) -> None:

@@ -1,7 +1,8 @@
 """T: where objects stand. Two arrangements of one list of meshes around the origin of the ground.
 
     arranged   variants v1-v3: upright in slots that depend on no seed, tops below z = 0.19 m + 0.32 rho
-    scattered  variant v4: random rotation (20 angles per axis), scale and place, at rest or floating
+    scattered  variant v4: random rotation (20 angles per axis, or for a share upright), scale and place, at
+               rest or floating
 
 Density matters more than order: objects may touch and overlap, but none may swallow a camera or a light.
 `arranged` guarantees that by its funnel shape (cameras and lights start at 20 degrees above the focus, or
@@ -123,6 +124,8 @@ def _draw_rand(
         scale = max(float(np.median(rho)) / config.spread_m, 1.0)
         size_m, z = size_m * scale, focus_m[2] + (z - focus_m[2]) * scale
     spots = np.c_[focus_m[0] + rho * np.cos(phi), focus_m[1] + rho * np.sin(phi), z]
+    if rng.random() < config.upright_share and not floating:
+        turn_deg[:2] = 0.0
     return _Draw(turn_deg, size_m, stretch, bool(floating), np.clip(spots, space.low, space.high))
 
 

@@ -8,7 +8,7 @@ it by a share w, uniform over 0.1 to 0.8. So a red floor fills few photographs w
 A camera meters the scene to a mid-grey and backs off for highlights, and neither exactly. So `key` is
 log-uniform over 0.07 to 0.36 (an 18 % card, from a stop over to one and a third under) and the share of
 pixels that may reach saturation is log-uniform over 0.005 % to 25 %: a white sky or snow burns out in one
-photograph in twenty, and a denoiser that never saw it loses most there (docs/results.md). In 6 % of frames
+photograph in twenty, and a denoiser that never saw it loses most there (docs/results.md). In 3 % of frames
 o is 2 to 6 instead of 1, log-uniform: overexposed, so that red and blue saturate too, as they do in the skies
 of photographs; where a network has never seen that, it darkens them.
 Low light needs no darker image: the camera answers it with ISO, and ISO sets the noise.
@@ -24,7 +24,7 @@ from fsid.sensor.colour import SRGB_TO_XYZ
 KEY_RANGE = (0.07, 0.36)
 CLIPPED_PERCENT_RANGE = (0.005, 25.0)
 BALANCED_RANGE = (0.1, 0.8)
-OVEREXPOSED_SHARE = 0.06
+OVEREXPOSED_SHARE = 0.03
 OVEREXPOSED_RANGE = (2.0, 6.0)
 WORLD_RGB = (0.98, 1.02, 0.74)
 """What photographs average to at luminance 1, linear sRGB: 100 of BSDS500, geometric mean."""
