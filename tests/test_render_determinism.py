@@ -146,7 +146,7 @@ from test_render_determinism import CONFIG, sample
 
 def held_bytes():
     gc.collect()
-    renderer._context.finish()
+    renderer._drain.run()
     ctypes.CDLL(None).malloc_trim(0)
     return int(open("/proc/self/statm").read().split()[1]) * 4096
 

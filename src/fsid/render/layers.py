@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Hashable, Iterable
+from collections.abc import Callable, Hashable, Iterable
 from dataclasses import dataclass
 
 import moderngl
@@ -50,8 +50,16 @@ def _layer_bytes(size: int) -> int:
 class LayerStore:
     """The resident layers. What a layer holds depends on its material alone, never on its slot."""
 
-    def __init__(self, context: moderngl.Context, size: int, budget_bytes: int = BUDGET_BYTES) -> None:
+    def __init__(
+        self,
+        context: moderngl.Context,
+        size: int,
+        drain: Callable[[], None] | None = None,
+        budget_bytes: int = BUDGET_BYTES,
+    ) -> None:
+        """drain: called before arrays are freed, so that the driver does not hold them (`Drain.run`)."""
         self._context = context
+        self._drain = drain or context.finish
         self._size = size
         self._budget_layers = min(MOST_LAYERS, max(1, budget_bytes // _layer_bytes(size)))
         self._resident: OrderedDict[Hashable, Layer] = OrderedDict()
@@ -78,6 +86,7 @@ class LayerStore:
 
     def release(self) -> None:
         """Free all layers; the store cannot be used afterwards."""
+        self._drain()
         for array in self._arrays:
             array.release()
         self._arrays, self._capacity = [], 0
@@ -100,6 +109,7 @@ class LayerStore:
     def _grow(self, capacity: int) -> None:
         """Arrays of `capacity` layers, the resident ones in their places; one array after the other, and each
         old one is free before the next is made, so that growth takes little more than the result."""
+        self._drain()
         for i in range(2):
             target = TextureArray(self._context, self._size, capacity)
             if self._capacity:

@@ -22,7 +22,7 @@ import numpy as np
 from fsid.errors import FsidError
 from fsid.render.buffers import Buffers
 from fsid.render.camera import lens_of
-from fsid.render.context import GlInfo, gl_info, open_context, return_large_blocks
+from fsid.render.context import GlInfo, gl_info, open_context, return_free_blocks, return_large_blocks
 from fsid.render.drain import Drain
 from fsid.render.drawable import View, view_of
 from fsid.render.exposure import Shot, shots_of
@@ -92,7 +92,7 @@ class Renderer:
         context, quality, grid = self._context, self._quality, self._grid
         self._texture_size = texture_size
         self._drain = Drain(context)
-        self._layers = LayerStore(context, texture_size)
+        self._layers = LayerStore(context, texture_size, self._drain.run)
         self._targets = Targets(context, grid)
         self._mirror_targets = Targets(context, grid)
         table = tap_table(quality)
@@ -203,17 +203,16 @@ class Renderer:
             self._draw_passes(stage, buffers, shot, self._mirror_targets if below is not None else None, mark)
         finally:
             buffers.release()
-            self._shadows.release()
             self._mirror_targets.release()
             self._targets.release_glass()
-            self._drain.run()
+            return_free_blocks()
 
     def _load_layers(self, view: View, bake: Bake) -> dict[tuple[str, int], Layer]:
         wanted = {(m.family, m.variant): None for d in view.drawables for m in d.materials}
         size = fitting_size(self._texture_size, len(wanted))
         if size != self._layers.size:
             self._layers.release()
-            self._layers = LayerStore(self._context, size)
+            self._layers = LayerStore(self._context, size, self._drain.run)
         return self._layers.load(wanted, bake)
 
     def _draw_mirror(self, stage: Stage, buffers: Buffers, below: Shot) -> None:
@@ -239,7 +238,6 @@ class Renderer:
         self._shade.draw(targets, stage, buffers, shot, self._layers, mirror=mirror)
         if mirror is not None:
             mirror.release()
-            self._drain.run()
         if stage.glass.any():
             self._samples.draw_glass(targets, stage, buffers, shot)
             self._shade.draw_glass(targets, stage, buffers, shot, self._layers)

@@ -22,7 +22,8 @@ class ShadowAtlas:
         """Make the image for `size` texels, unless it is there."""
         if self._size == size:
             return
-        self.release()
+        for item in self._owned:
+            item.release()
         self._depth = self._context.depth_texture(size)
         self._depth.compare_func = ""
         self._depth.filter = (moderngl.NEAREST, moderngl.NEAREST)
@@ -33,12 +34,6 @@ class ShadowAtlas:
         self._to_moments = self._context.framebuffer([self._moments])
         self._owned = [self.framebuffer, self._to_moments, self._depth, self._moments]
         self._size = size
-
-    def release(self) -> None:
-        """Free the image."""
-        for item in self._owned:
-            item.release()
-        self._owned, self._size = [], (0, 0)
 
     def begin(self) -> None:
         """Draw depth of all tiles, from nothing."""

@@ -38,10 +38,6 @@ class ShadowPass:
         """Make the atlas as large as the plan says."""
         self._atlas.resize(plan.size)
 
-    def release(self) -> None:
-        """Free the atlas until it is made again."""
-        self._atlas.release()
-
     def draw(self, stage: Stage, buffers: Buffers, shots: Sequence[Shot]) -> None:
         """The tiles that any of the shots can see, and the moments of all."""
         geometry, lens = stage.geometry, shots[0].lens
