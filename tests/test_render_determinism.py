@@ -146,7 +146,7 @@ from test_render_determinism import CONFIG, sample
 
 def held_bytes():
     gc.collect()
-    renderer._drain.run()
+    renderer._context.finish()
     ctypes.CDLL(None).malloc_trim(0)
     return int(open("/proc/self/statm").read().split()[1]) * 4096
 
@@ -155,11 +155,12 @@ with Renderer(texture_size=64) as renderer:
     for count in (4, 12):
         for _ in range(count):
             frame = renderer.render(drawn)
+        renderer._drain.run()
         print(held_bytes())
     for layers in (1000, 1100):
         renderer._layers._grow(layers)
-        frame = renderer.render(drawn)
         print(held_bytes())
+        frame = renderer.render(drawn)
 """
 """What is held after warm-up and after twelve frames more; with 44 MB of textures, and with 48."""
 
