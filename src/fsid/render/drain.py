@@ -3,7 +3,7 @@
 Mesa's llvmpipe draws into a row of scenes of its own. Each keeps what it has read until it is used again, and
 the first idle one is always taken: those at the end of the row, which only a busy moment reaches, hold images
 that were freed many frames ago. A busy moment made on purpose empties them all. It costs the next frame a
-tenth, so it is made only before much is freed. Other drivers have nothing to give back.
+seventh, so it is made only before much is freed. Other drivers have nothing to give back.
 """
 
 from __future__ import annotations

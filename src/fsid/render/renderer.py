@@ -236,8 +236,6 @@ class Renderer:
         mark("occlusion")
         self._shadows.draw_blocks(targets, stage, buffers, shot)
         self._shade.draw(targets, stage, buffers, shot, self._layers, mirror=mirror)
-        if mirror is not None:
-            mirror.release()
         if stage.glass.any():
             self._samples.draw_glass(targets, stage, buffers, shot)
             self._shade.draw_glass(targets, stage, buffers, shot, self._layers)
