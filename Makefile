@@ -7,7 +7,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 TEST_READY := $(VENV)/.test-ready
-BENCH_WITH_INPUT := bench/altered_pictures.py bench/conditioning.py bench/error_bands.py
+BENCH_WITH_INPUT := bench/altered_pictures.py bench/conditioning.py bench/cycles.py bench/error_bands.py
 
 .PHONY: demo test bench setup clean
 

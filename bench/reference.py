@@ -1,21 +1,17 @@
 """The rasteriser beside other renderers on the same scenes: seconds per frame, and the noise that is left.
 
     python bench/reference.py --width 960 --samples 64                 Mitsuba 3 (fsid[reference])
-    python bench/reference.py --width 960 --blender PYTHON             Blender Cycles too, through the .glb
     python bench/reference.py --direct --objects 12 --width 240        agreement about the lights alone
 
-Times are the best of `--repeat` draws of a scene that is already loaded, in one run, renderers in turn;
-PYTHON is an interpreter that has `bpy`. Noise is the standard deviation between two renders that differ in
-their seed alone, relative to the median radiance: the rasteriser's is 0 by construction (same bits). --direct
-compares what comes straight from the lights: one bounce, and no light of the walls in the rasteriser.
+Times are the best of `--repeat` draws of a scene that is already loaded, in one run, renderers in turn.
+Noise is the standard deviation between two renders that differ in their seed alone, relative to the median
+radiance: the rasteriser's is 0 by construction (same bits). --direct compares what comes straight from the
+lights: one bounce, and no light of the walls in the rasteriser. Blender Cycles: bench/cycles.py.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
-import subprocess
-import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -39,7 +35,6 @@ def main() -> None:
     parser.add_argument("--objects", type=int, default=40, help="per scene")
     parser.add_argument("--texture-size", type=int, default=512, help="texels per side of a material")
     parser.add_argument("--repeat", type=int, default=2, help="draws of each, the fastest counts")
-    parser.add_argument("--blender", type=Path, help="Python with bpy: Cycles with 32 samples and denoiser")
     parser.add_argument("--direct", action="store_true", help="compare direct light instead, in rooms")
     parser.add_argument("--figure", type=Path, help="picture of both renderers side by side to write")
     options = parser.parse_args()
@@ -88,9 +83,6 @@ def compare(
     if len(images) > 1:
         print(f"  noise of {options.samples} samples: {noise(*images[:2]):.3f} of the median radiance")
     print(f"  {agreement(drawn, traced)}")
-    if options.blender:
-        cycles_s = cycles(options.blender, scene)
-        print(f"  Cycles, 32 samples + denoiser: {cycles_s:.1f} s = {cycles_s / raster_s:.0f} x")
     return np.hstack([developed(drawn, drawn), developed(traced, drawn)])
 
 
@@ -131,39 +123,6 @@ def developed(frame: Frame, exposure: Frame) -> np.ndarray:
     """sRGB-like 8 bit, as bright as `exposure` says."""
     light = frame.radiance / np.median(exposure.radiance) * 0.2
     return (np.clip(light, 0, 1) ** (1 / 2.2) * 255).astype(np.uint8)
-
-
-_CYCLES = """
-import sys, time, json, bpy
-glb, width, height = sys.argv[-3], int(sys.argv[-2]), int(sys.argv[-1])
-bpy.ops.wm.read_factory_settings(use_empty=True)
-bpy.ops.import_scene.gltf(filepath=glb)
-scene = bpy.context.scene
-scene.camera = next(o for o in bpy.data.objects if o.type == "CAMERA")
-scene.render.engine = "CYCLES"
-scene.cycles.samples, scene.cycles.use_denoising, scene.cycles.device = 32, True, "CPU"
-scene.cycles.use_adaptive_sampling = False
-scene.render.resolution_x, scene.render.resolution_y = width, height
-scene.render.resolution_percentage = 100
-scene.render.image_settings.file_format = "PNG"
-scene.render.filepath = glb[:-4] + ".png"
-start = time.perf_counter()
-bpy.ops.render.render(write_still=True)
-print(json.dumps({"seconds": time.perf_counter() - start}))
-"""
-
-
-def cycles(python: Path, scene: Scene) -> float:
-    """Seconds of one Cycles render of the exported scene."""
-    from fsid.render.gltf import write_glb
-
-    with tempfile.TemporaryDirectory() as folder:
-        glb = Path(folder) / "scene.glb"
-        write_glb(glb, scene, texture_size=512)
-        size = [str(scene.cameras[0].width), str(scene.cameras[0].height)]
-        command = [str(python), "-c", _CYCLES, str(glb), *size]
-        out = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    return float(json.loads(next(line for line in out.splitlines() if line.startswith("{")))["seconds"])
 
 
 if __name__ == "__main__":
