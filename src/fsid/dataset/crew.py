@@ -127,7 +127,8 @@ def _feed(crew: Crew, worker: int, tasks: Sequence[Any], queue: deque[int], busy
 def _hopeless(last: Lost, task: object) -> str:
     return (
         f"no worker lives long enough to make anything: the last died at {task} ({last.reason}). "
-        "Is there too little memory, or does `python -c 'import fsid.dataset'` fail?"
+        "Is there too little memory, does `python -c 'import fsid.dataset'` fail, or does a script of yours "
+        "call fsid outside `if __name__ == '__main__':`?"
     )
 
 
