@@ -18,7 +18,7 @@ from fsid.scene import VARIANTS, SceneConfig
 TASKS = ("denoise", "super-resolution", "deblur", "burst")
 RENDERERS = ("raster", "reference")
 QUALITIES = ("high", "fast")
-_POSITIVE = ("crops", "exposures", "noise_levels")
+_POSITIVE = ("crops", "exposures", "noise_levels", "lens_images")
 
 
 @dataclass(frozen=True)
@@ -56,6 +56,7 @@ class GenerateConfig:
     validation_every: every so-manieth scene (or photograph) is for validation, all its pairs; 0: none.
     renderer: raster (OpenGL), or reference (path tracer: slow, and its noise is in the clean image).
     quality: of the rasteriser, high or fast. supersampling: edge of the grid of samples per pixel.
+    lens_images: at most so many images make one with depth of field; 1: one image, blurred by its depth.
     texture_size: pixels per edge of a baked material at most, a power of two; 0 follows the width (see
     `texture_px`). A scene of many materials has smaller ones (`fsid.render.layers`).
     images: a folder of photographs or linear .exr renders to use instead of scenes ("" renders scenes).
@@ -77,6 +78,7 @@ class GenerateConfig:
     renderer: str = "raster"
     quality: str = "high"
     supersampling: int = 2
+    lens_images: int = 1
     texture_size: int = 0
     images: str = ""
     checks: Checks = field(default_factory=Checks)

@@ -94,10 +94,11 @@ def generate(
 ) -> int:
     """Make the samples 0 .. count-1 that `out` lacks; returns how many were made.
 
-    workers: short for Workforce(workers). shard_size: samples, a multiple of `config.pairs_per_frame`; 0
-    takes the first from SHARD_SIZE on. progress(done, total): samples, called at the start and after every
-    shard. lost(line): called for every worker that died; its shard is made again by another. command: for
-    the dataset card, README.md, which is written when all samples are there.
+    workers: short for Workforce(workers); each is a process that imports the calling script, so a script
+    calls this under `if __name__ == "__main__":`. shard_size: samples, a multiple of
+    `config.pairs_per_frame`; 0 takes the first from SHARD_SIZE on. progress(done, total): samples, called at
+    the start and after every shard. lost(line): called for every worker that died; its shard is made again by
+    another. command: for the dataset card, README.md, which is written when all samples are there.
     Raises FsidError where `out` already holds a dataset of another configuration or seed, where another
     process fills it, where the disk refuses, or where a shard kills its worker again and again.
     """
@@ -194,7 +195,7 @@ def _used(dataset: DatasetConfig) -> DatasetConfig:
     config, unused = dataset.generate, GenerateConfig()
     if not config.images:
         return dataset
-    keys = ("variant", "renderer", "quality", "supersampling", "texture_size", "scene")
+    keys = ("variant", "renderer", "quality", "supersampling", "lens_images", "texture_size", "scene")
     return replace(dataset, generate=replace(config, **{key: getattr(unused, key) for key in keys}))
 
 

@@ -44,6 +44,7 @@ def rendering(config: GenerateConfig, gpu: int | None = None) -> Iterator[SceneR
             supersampling=config.supersampling,
             texture_size=config.texture_px,
             quality=config.quality,
+            lens_images=config.lens_images,
         ) as renderer:
             yield renderer
 

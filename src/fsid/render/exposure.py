@@ -3,7 +3,9 @@
     radiance = 1 / N sum_i image(t_i, lens place_i)
 
 The times are evenly spaced and the places lie on a spiral, alike for every pixel: no noise. N follows the
-widest blur in the image, so that neighbouring images are at most STEP_PX apart, up to a limit.
+widest blur in the image, so that neighbouring images are at most STEP_PX (of movement) or LENS_STEP_PX (of
+defocus) apart, up to a limit. Every place stands for a part of the lens, an opening 1 / sqrt(N) as wide,
+whose blur its image is given (`fsid.render.defocus`): few places are enough, and one alone makes a picture.
 """
 
 from __future__ import annotations
@@ -21,17 +23,22 @@ from fsid.render.quality import spiral
 from fsid.scene.model import ZERO, Camera
 
 STEP_PX = 1.5
+LENS_STEP_PX = 4.0
 _FEWEST = 4
 
 
 @dataclass(frozen=True)
 class Shot:
-    """One sharp image. shift_px: of the image. lens_offset: of the rays, place on the lens / focus_m."""
+    """One image. shift_px: of the image. lens_offset: of the rays, place on the lens / focus_m.
+
+    aperture_m: diameter of the part of the lens that it stands for.
+    """
 
     lens: Lens
     time_s: float
     shift_px: tuple[float, float] = (0.0, 0.0)
     lens_offset: tuple[float, float] = (0.0, 0.0)
+    aperture_m: float = 0.0
 
     @property
     def seen_shift(self) -> tuple[float, float]:
@@ -48,23 +55,28 @@ def shots_of(
     middle: Shot,
     sample: float,
     most: int,
+    most_places: int,
 ) -> list[Shot]:
-    """The images to average; none where the camera's image is sharp. frame: that of the shot `middle`."""
+    """The images to average; none where the camera's image is sharp. frame: that of the shot `middle`.
+
+    most: images. most_places: places on the lens; 1 is its middle.
+    """
     moving = camera.exposure_s > 0 and (
         camera.velocity_m_s != ZERO
         or camera.spin_deg_s != ZERO
         or any(drawable.motion != UNMOVED for drawable in drawables)
     )
     count = 0
-    if moving:
-        count = max(count, round(_motion_px(camera, drawables, frame, sample) / STEP_PX) + 1)
     if camera.aperture_m > 0:
-        across = _blur_px(camera, middle.lens, frame) / STEP_PX
-        count = max(count, round(np.pi / 4 * across * across) + 1)
+        across = _blur_px(camera, middle.lens, frame) / LENS_STEP_PX
+        count = min(round(np.pi / 4 * across * across) + 1, most_places)
+    if moving:
+        steps = round(_motion_px(camera, drawables, frame, sample) / STEP_PX) + 1
+        count = int(np.clip(max(count, steps), _FEWEST, most))
     if count == 0:
         return []
-    count = int(np.clip(count, _FEWEST, most))
     places = spiral(count) * camera.aperture_m / 2
+    part_m = camera.aperture_m / np.sqrt(count)
     order = np.argsort((np.arange(count) * 0.6180339887) % 1.0, kind="stable")
     shots = []
     for i, (right, up) in enumerate(places[order]):
@@ -73,7 +85,7 @@ def shots_of(
         offset = (float(right / camera.focus_m), float(up / camera.focus_m))
         position = lens.position + right * lens.rotation[0] + up * lens.rotation[1]
         moved = Lens(lens.rotation, position, lens.focal, lens.seen_px, lens.seen_focal, lens.model, lens.k)
-        shots.append(Shot(moved, camera.time_s + since, middle.shift_px, offset))
+        shots.append(Shot(moved, camera.time_s + since, middle.shift_px, offset, part_m))
     return shots
 
 

@@ -14,7 +14,7 @@ import numpy as np
 class Quality:
     """search_taps, filter_taps: per shadow. occlusion_taps: per block. probes: per texture footprint.
 
-    shadow_px: edge of a shadow map's tile, texels. shots: at most so many images for one blurred image.
+    shadow_px: edge of a shadow map's tile, texels. shots: at most so many images for one blurred by movement.
     """
 
     search_taps: int

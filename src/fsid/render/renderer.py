@@ -23,6 +23,7 @@ from fsid.errors import FsidError
 from fsid.render.buffers import Buffers
 from fsid.render.camera import lens_of
 from fsid.render.context import GlInfo, gl_info, open_context, return_free_blocks, return_large_blocks
+from fsid.render.defocus import defocus
 from fsid.render.drain import Drain
 from fsid.render.drawable import View, view_of
 from fsid.render.exposure import Shot, shots_of
@@ -39,7 +40,7 @@ from fsid.render.softness import soften
 from fsid.render.stage import Stage, stage_of
 from fsid.render.targets import Targets
 from fsid.render.texels import Bake, bake_texels
-from fsid.scene.model import ZERO, Scene
+from fsid.scene.model import ZERO, Camera, Scene
 
 Mark = Callable[[str], None]
 """Called with the name of each stage when it has been issued; the benchmark measures with it."""
@@ -54,6 +55,8 @@ class Renderer:
     grid of samples per pixel, 1..4. texture_size: texels per side of a material tile, a power of two; fewer
     where a scene has more materials than texture memory is meant for (`fsid.render.layers.BUDGET_BYTES`).
     quality: "high", or "fast" with fewer taps and coarser shadow maps (docs/render.md has both measured).
+    lens_images: at most so many images, seen from places on the lens, make one with depth of field; each is
+    blurred by its depth for the part of the lens that it stands for.
     Raises FsidError where OpenGL 4.3 is missing or a second Renderer is opened in one process.
     """
 
@@ -66,6 +69,7 @@ class Renderer:
         supersampling: int = 2,
         texture_size: int = 1024,
         quality: str = "high",
+        lens_images: int = 1,
     ) -> None:
         if Renderer._active is not None:
             raise FsidError(
@@ -77,7 +81,10 @@ class Renderer:
             raise FsidError(f"texture_size {texture_size}: must be a power of two from 64 to 8192")
         if quality not in QUALITIES:
             raise FsidError(f"quality '{quality}': use {' or '.join(QUALITIES)}")
+        if lens_images < 1:
+            raise FsidError(f"lens_images {lens_images}: must be at least 1")
         self._quality = QUALITIES[quality]
+        self._lens_images = lens_images
         self._grid = supersampling
         return_large_blocks()
         self._context = open_context(device_index)
@@ -170,15 +177,19 @@ class Renderer:
         self._draw(view, shot, bake, mark)
         frame = self._targets.read_frame()
         mark("readback")
-        shots = shots_of(camera, view.drawables, frame, shot, self._label_sample, self._quality.shots)
-        if not shots:
-            return replace(frame, radiance=soften(frame.radiance, camera.softness_px))
-        total = np.zeros_like(frame.radiance)
-        for part in shots:
-            self._draw(view, part, bake, mark)
-            total += self._targets.read_radiance()[..., :3]
-        mean = total / np.float32(len(shots))
-        return replace(frame, radiance=soften(mean, camera.softness_px))
+        most, places = self._quality.shots, self._lens_images
+        shots = shots_of(camera, view.drawables, frame, shot, self._label_sample, most, places)
+        radiance = frame.radiance
+        if len(shots) == 1:
+            radiance = _through_lens(shots[0], camera, radiance, frame.depth)
+        elif shots:
+            radiance = np.zeros_like(radiance)
+            for part in shots:
+                self._draw(view, part, bake, mark)
+                image = self._targets.read_radiance()
+                radiance += _through_lens(part, camera, image[..., :3], image[..., 3])
+            radiance /= np.float32(len(shots))
+        return replace(frame, radiance=soften(radiance, camera.softness_px))
 
     def wait(self) -> None:
         """Return when everything issued so far is done; only measuring needs it."""
@@ -241,3 +252,12 @@ class Renderer:
             self._shade.draw_glass(targets, stage, buffers, shot, self._layers)
         self._context.finish()
         mark("shading")
+
+
+def _through_lens(shot: Shot, camera: Camera, radiance: np.ndarray, depth: np.ndarray) -> np.ndarray:
+    """An image as the part of the lens that `shot` stands for shows it. depth: 0 or inf where nothing is."""
+    if shot.aperture_m == 0:
+        return radiance
+    focal_px = shot.lens.focal[0] * camera.width / 2
+    depth = np.where(depth > 0, depth, np.float32(np.inf))
+    return defocus(radiance, depth, shot.aperture_m, camera.focus_m, focal_px)

@@ -1,6 +1,6 @@
 """How a scene is seen: view, rig, movement and lens.
 
-The defaults are one still camera with a good lens, nearly always sharp."""
+The defaults are one still camera with a good lens."""
 
 # ruff: noqa: RUF009  (a knob is a dataclass field)
 from __future__ import annotations
@@ -77,11 +77,11 @@ class LensConfig:
     """Displacement at the corner of the image relative to its radius: below 0 barrel, above pincushion."""
     fisheye_share: float = knob(0.0, 0.0, 1.0)
     """Share with a fisheye lens instead."""
-    blur_share: float = knob(0.03, 0.0, 1.0)
-    """Share with depth of field; the rest is sharp everywhere. It costs many renders of a scene."""
-    aperture_m: Range = knob((0.0005, 0.004), 1e-5, 0.5)
-    """Diameter of the lens opening, for depth of field; log-uniform."""
-    focus: Range = knob((0.8, 1.3), 0.1, 10.0)
+    blur_share: float = knob(0.12, 0.0, 1.0)
+    """Share with depth of field; the rest is sharp everywhere."""
+    aperture_m: Range = knob((0.004, 0.05), 1e-5, 0.5)
+    """Diameter of the lens opening, for depth of field: a phone's to a fast lens's; log-uniform."""
+    focus: Range = knob((0.7, 1.4), 0.1, 10.0)
     """Depth of the sharp plane relative to the distance of the focus."""
     vignetting_share: float = knob(0.3, 0.0, 1.0)
     """Share whose corners are darker."""

@@ -1,0 +1,112 @@
+"""Depth of field from one sharp image and its depth.
+
+    diameter of the circle of confusion = |1 / focus_m - 1 / depth| * aperture_m * focal length in pixels
+
+The image is cut into layers of like blur; each is blurred and laid over those behind it. A layer covers what
+all that is not farther covers, so a surface across several layers has no seams. What a near thing hides is
+not known, so it is continued from beside it; and the blur is a Gaussian with the standard deviation of the
+disc, a quarter of its diameter. Exact is the mean of many images seen from places on the lens
+(`fsid.render.exposure`); docs/results.md has how far both are apart.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import convolve1d, gaussian_filter1d
+
+_SIGMA_PX = np.array([0.0, 0.3, 0.5, 0.85, 1.4, 2.4, 4.0, 6.8, 11.5, 20.0])
+"""Standard deviations of the layers; what lies between two is shared so that its variance is right."""
+_SEEN = 0.1
+"""Share of the neighbourhood from which on what is behind counts as known."""
+_SHORT_PX = 0.8
+_COARSE_PX = 1.6
+"""From this standard deviation on half the resolution holds all that is left."""
+_COARSE_VARIANCE = 1.0
+"""Of halving (1/4) and doubling (3/4) alone, pixels squared."""
+_TRUNCATE, _NONE = 3.0, 1e-6
+
+
+def defocus(
+    radiance: np.ndarray, depth: np.ndarray, aperture_m: float, focus_m: float, focal_px: float
+) -> np.ndarray:
+    """A sharp image, radiance (H, W, 3) and depth (H, W) in metres, as a lens opening shows it; float32.
+
+    aperture_m: diameter of the opening. focus_m: depth of the sharp plane. focal_px: focal length in pixels.
+    """
+    nearness = 1 / depth.astype(np.float64) - 1 / focus_m
+    blur = nearness * aperture_m * focal_px / 4  # above 0 before the sharp plane
+    place = np.interp(blur**2, _SIGMA_PX**2, np.arange(len(_SIGMA_PX))) * np.sign(blur)
+    seen = np.zeros((*depth.shape, 4), np.float32)  # what lies behind the next layer: light * known, known
+    for layer in range(int(np.floor(place.min())), int(np.ceil(place.max())) + 1):
+        sigma_px = float(_SIGMA_PX[abs(layer)])
+        window = _window(np.abs(place - layer) < 1, int(np.ceil(_TRUNCATE * sigma_px)) + 4)
+        if window is None:
+            continue
+        ahead = (place[window] - layer).astype(np.float32)
+        parts = np.empty((*ahead.shape, 5), np.float32)  # light, this layer, all that is not farther
+        np.maximum(1 - np.abs(ahead), 0, out=parts[..., 3])
+        np.clip(ahead + 1, 0, 1, out=parts[..., 4])
+        np.multiply(radiance[window], parts[..., 3:4], out=parts[..., :3])
+        parts = _blurred(parts, sigma_px)
+        front, own = parts[..., :4], parts[..., 3]
+        cover = np.minimum(own / _SEEN, parts[..., 4])
+        behind = _continued(seen[window], sigma_px if layer > 0 and sigma_px > _SHORT_PX else 0.0)
+        behind *= (1 - cover)[..., None]
+        front *= (cover / np.maximum(own, _NONE))[..., None]
+        np.add(behind, front, out=seen[window])
+    return seen[..., :3] / np.maximum(seen[..., 3:], _NONE)
+
+
+def _continued(seen: np.ndarray, sigma_px: float) -> np.ndarray:
+    """`seen` (H, W, 4) with what is not known taken from about `sigma_px` beside it, where anything is known.
+
+    What lies behind the sharp plane reaches under what hides it by its own blur already: there 0 is enough.
+    """
+    known = seen[..., 3]
+    if sigma_px == 0:
+        return seen * np.maximum(np.minimum(1 / _SEEN, 1 / np.maximum(known, _NONE)), 1.0)[..., None]
+    beside = _blurred(seen, sigma_px)
+    there = beside[..., 3]
+    missing = np.minimum(there / _SEEN, 1.0) - np.minimum(known, 1.0)
+    beside *= (np.maximum(missing, 0.0) / np.maximum(there, _NONE))[..., None]
+    beside += seen
+    return beside
+
+
+def _window(mask: np.ndarray, margin: int) -> tuple[slice, slice] | None:
+    """The rows and columns of `mask` (H, W) that are not empty, with a margin; None where all are."""
+    if not mask.any():
+        return None
+    sides = [np.flatnonzero(mask.any(axis))[[0, -1]] for axis in (1, 0)]
+    rows, columns = (slice(max(int(a) - margin, 0), int(b) + margin + 1) for a, b in sides)
+    return rows, columns
+
+
+def _blurred(image: np.ndarray, sigma_px: float) -> np.ndarray:
+    """(H, W, C) through a Gaussian; wide ones at half the resolution."""
+    if sigma_px == 0:
+        return image
+    if sigma_px >= _COARSE_PX and min(image.shape[:2]) >= 64:
+        left = np.sqrt(sigma_px**2 - _COARSE_VARIANCE)
+        return _finer(_blurred(_halved(image), float(left) / 2), image.shape[:2])
+    for axis in (0, 1):
+        if sigma_px < _SHORT_PX:  # a sampled Gaussian would be too narrow
+            side = sigma_px**2 / 2
+            image = convolve1d(image, (side, 1 - 2 * side, side), axis=axis, mode="nearest")
+        else:
+            image = gaussian_filter1d(image, sigma_px, axis=axis, mode="nearest", truncate=_TRUNCATE)
+    return image
+
+
+def _halved(image: np.ndarray) -> np.ndarray:
+    height, width = image.shape[:2]
+    even = np.pad(image, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
+    rows = even[0::2] + even[1::2]
+    return np.asarray((rows[:, 0::2] + rows[:, 1::2]) * np.float32(0.25))
+
+
+def _finer(image: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """Twice as large, linearly interpolated, cut to `size`."""
+    for axis in (0, 1):
+        image = convolve1d(np.repeat(image, 2, axis), (0.25, 0.5, 0.25), axis=axis, mode="nearest")
+    return image[: size[0], : size[1]]

@@ -1,0 +1,109 @@
+"""Depth of field from one image: the circle of confusion, what is hidden, and the exact way beside it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fsid.errors import FsidError
+from fsid.render import Renderer
+from fsid.render.camera import lens_of
+from fsid.render.defocus import defocus
+from fsid.scene.model import Transform
+from render_scenes import FROM_ABOVE, bake_plain, grid, lambertian, sphere, view
+
+FOCUS_M, FOCAL_PX = 2.0, 400.0
+
+
+def at(x: float, y: float, z: float) -> Transform:
+    return Transform((x, y, z), (0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
+
+
+def aperture_of(diameter_px: float, depth_m: float) -> float:
+    """The opening that gives things at `depth_m` this circle of confusion."""
+    return diameter_px / (FOCAL_PX * abs(1 / depth_m - 1 / FOCUS_M))
+
+
+@pytest.mark.parametrize("depth_m", [1.2, 5.0, np.inf])
+@pytest.mark.parametrize("diameter_px", [1.0, 3.0, 8.0, 20.0])
+def test_a_point_becomes_as_wide_as_its_disc(depth_m: float, diameter_px: float) -> None:
+    """The variance of a disc of diameter D is D^2 / 16 along each axis, and no light is lost."""
+    image = np.zeros((161, 161, 3), np.float32)
+    image[80, 80] = 1.0
+    depth = np.full((161, 161), depth_m, np.float32)
+    seen = defocus(image, depth, aperture_of(diameter_px, depth_m), FOCUS_M, FOCAL_PX)[..., 1].astype(float)
+    at = np.arange(161)
+    mean = (seen.sum(0) * at).sum() / seen.sum()
+    assert seen.sum() == pytest.approx(1.0, abs=0.01)
+    assert (seen.sum(0) * (at - mean) ** 2).sum() == pytest.approx(diameter_px**2 / 16, rel=0.06)
+
+
+def test_the_sharp_plane_stays_as_it_is() -> None:
+    image = np.random.default_rng(0).random((40, 50, 3), np.float32)
+    depth = np.full((40, 50), FOCUS_M, np.float32)
+    np.testing.assert_allclose(defocus(image, depth, 0.1, FOCUS_M, FOCAL_PX), image, rtol=1e-6)
+
+
+def test_a_sharp_thing_neither_blurs_nor_bleeds_into_what_is_behind_it() -> None:
+    depth = np.full((60, 120), 8.0, np.float32)
+    depth[:, :60] = FOCUS_M
+    image = np.where(depth[..., None] == FOCUS_M, np.float32(1.0), np.float32(0.1)) * np.ones(3, np.float32)
+    seen = defocus(image, depth, aperture_of(12.0, 8.0), FOCUS_M, FOCAL_PX)
+    np.testing.assert_allclose(seen, image, atol=1e-3)
+
+
+def test_a_near_thing_out_of_focus_covers_what_is_sharp_softly() -> None:
+    depth = np.full((60, 120), FOCUS_M, np.float32)
+    depth[:, :60] = 1.0
+    image = np.where(depth[..., None] == 1.0, np.float32(1.0), np.float32(0.0)) * np.ones(3, np.float32)
+    row = defocus(image, depth, aperture_of(16.0, 1.0), FOCUS_M, FOCAL_PX)[30, :, 0]
+    assert np.diff(row).max() < 1e-4
+    low, high = (np.interp(-level, -row, np.arange(120)) for level in (0.9, 0.1))
+    assert high - low == pytest.approx(0.687 * 16, rel=0.2)
+    assert (low + high) / 2 == pytest.approx(59.5, abs=1.0)
+
+
+@pytest.mark.parametrize("images", [1, 16])
+def test_depth_of_field_blurs_by_the_circle_of_confusion(images: int) -> None:
+    """Sharp at the focus; else an edge is as wide as a disc of diameter A f |1/F - 1/z|."""
+    camera = replace(FROM_ABOVE, width=192, height=192, focus_m=2.0)
+    with Renderer(texture_size=64, lens_images=images) as renderer:
+        for height, aperture in ((0.0, 0.06), (0.7, 0.06), (0.7, 0.3)):
+            edge = lambertian(grid(4.0), (0.9, 0.9, 0.9), at=at(2.0, 0.0, height))
+            opened = replace(camera, aperture_m=aperture)
+            row = renderer.draw(view(edge, ambient=1.0, camera=opened), bake=bake_plain).radiance[96, :, 0]
+            row = row / row[150]
+            low, high = (np.interp(level, row, np.arange(192)) for level in (0.1, 0.9))
+            diameter = aperture * (96 / np.tan(np.radians(30))) * abs(1 / 2.0 - 1 / (2.0 - height))
+            assert abs((high - low) - 0.687 * diameter) < 0.25 * 0.687 * diameter + 1.0
+            assert np.diff(row).min() > -0.01
+
+
+def test_one_image_comes_near_to_many() -> None:
+    """A row of balls before a floor, from one image and from 16; the sharp image is far from both."""
+    balls = [
+        lambertian(sphere(0.2, 48), (0.8, 0.3, 0.2), at=at(x, y, x + 0.6))
+        for x in (-0.4, 0.0, 0.4, 0.8)
+        for y in (-0.5, 0.0, 0.5)
+    ]
+    scene = view(lambertian(grid(4.0), (0.2, 0.5, 0.7)), *balls, ambient=1.0)
+    sharp = replace(FROM_ABOVE, width=192, height=192)
+    opened = replace(sharp, aperture_m=0.15, focus_m=1.4)
+    with Renderer(texture_size=64, lens_images=16) as renderer:
+        plain = renderer.draw(replace(scene, camera=sharp), bake=bake_plain)
+        many = renderer.draw(replace(scene, camera=opened), bake=bake_plain)
+    with Renderer(texture_size=64, lens_images=1) as renderer:
+        one = renderer.draw(replace(scene, camera=opened), bake=bake_plain)
+    focal_px = lens_of(opened).focal[0] * 96
+    again = defocus(plain.radiance, plain.depth, 0.15, 1.4, focal_px)
+    np.testing.assert_allclose(one.radiance, again, rtol=1e-5, atol=1e-6)
+    np.testing.assert_array_equal(one.depth, plain.depth)
+    error = [np.sqrt(((image.radiance - many.radiance) ** 2).mean()) for image in (one, plain)]
+    assert error[0] < 0.55 * error[1]
+
+
+def test_at_least_one_image_is_needed() -> None:
+    with pytest.raises(FsidError, match="lens_images 0"):
+        Renderer(lens_images=0)
