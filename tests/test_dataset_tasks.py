@@ -127,6 +127,52 @@ def test_a_linear_render_takes_the_exact_linear_path(
     np.testing.assert_array_equal(sample.clean.mosaic, expected.mosaic)
 
 
+def write_layers(path: Path, layers: dict[str, str], in_parts: bool) -> None:
+    """A file of layers, name: channels; each pixel of the n-th layer is n + 1, its second channel 10 more."""
+    openexr = pytest.importorskip("OpenEXR")
+    header = {"compression": openexr.ZIP_COMPRESSION, "type": openexr.scanlineimage}
+    parts = [
+        {
+            f"{layer}.{channel}" if layer else channel: np.full((64, 96), n + 1 + 10 * i, np.float32)
+            for i, channel in enumerate(channels)
+        }
+        for n, (layer, channels) in enumerate(layers.items())
+    ]
+    if in_parts:
+        named = [openexr.Part({**header, "name": f"part {n}"}, part) for n, part in enumerate(parts)]
+        file = openexr.File(named)
+    else:
+        file = openexr.File(header, {name: pixels for part in parts for name, pixels in part.items()})
+    file.write(str(path))
+
+
+@pytest.mark.parametrize("in_parts", [False, True], ids=["one part", "a part per layer"])
+def test_of_many_layers_the_one_with_all_light_is_read(in_parts: bool, tmp_path: Path) -> None:
+    """The layers that Blender 5.0 writes as OpenEXR MultiLayer, and files of other engines."""
+    path = tmp_path / "layers.exr"
+    blender = {
+        "View.Depth": "Z",
+        "View.Normal": "XYZ",
+        "View.Diffuse Color": "RGB",
+        "View.Combined": "RGBA",
+        "View.Noisy Image": "RGBA",
+    }
+    for layers, expected in [
+        (blender, (4, 14, 24)),
+        ({"depth": "Z", "": "RGB", "albedo": "RGB"}, (2, 12, 22)),
+        ({"normal": "XYZ", "beauty": "RGBA"}, (2, 12, 22)),
+        ({"normal": "XYZ", "": "Y"}, (2, 2, 2)),
+    ]:
+        write_layers(path, layers, in_parts)
+        np.testing.assert_array_equal(read_exr(path), np.broadcast_to(np.float32(expected), (64, 96, 3)))
+    write_layers(path, {"diffuse": "RGB", "specular": "RGB"}, in_parts)
+    with pytest.raises(FsidError, match=r"layers\.exr: has the layers diffuse, specular; write one"):
+        read_exr(path)
+    write_layers(path, {"normal": "XYZ", "depth": "Z"}, in_parts)
+    with pytest.raises(FsidError, match=r"layers\.exr: has the channels depth\.Z, normal\.X"):
+        read_exr(path)
+
+
 def test_bad_renders_are_named(tmp_path: Path) -> None:
     light = np.ones((64, 64, 3), np.float32)
     rec2020 = (0.708, 0.292, 0.17, 0.797, 0.131, 0.046, 0.3127, 0.329)

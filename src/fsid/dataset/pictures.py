@@ -17,6 +17,8 @@ from fsid.errors import FsidError
 EXR_SUFFIX = ".exr"
 _SRGB_CHROMATICITIES = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
 _SMALLEST_PX = 32
+_BEAUTY = "Combined"
+"""Blender's name of the layer that holds all light."""
 
 
 @dataclass(frozen=True)
@@ -47,8 +49,9 @@ def read_picture(path: Path) -> Picture:
 
 
 def read_exr(path: Path) -> np.ndarray:
-    """(H, W, 3) float32 linear sRGB light >= 0 of the channels R, G, B (or Y) of the first part, even size.
+    """(H, W, 3) float32 linear sRGB light >= 0, even size, of the channels R, G, B (or Y).
 
+    Of several layers: the one without a name, else Blender's `Combined`, else the only one with colours.
     Negative values, which renderers' filters leave, become 0. FsidError: unreadable, no such channels, other
     primaries than those of sRGB, NaN or infinity.
     """
@@ -56,23 +59,40 @@ def read_exr(path: Path) -> np.ndarray:
 
     try:
         with OpenEXR.File(str(path), separate_channels=True) as file:
-            channels = {name: np.asarray(c.pixels, np.float32) for name, c in file.channels().items()}
+            parts = [{name: c.pixels for name, c in part.channels.items()} for part in file.parts]
             chromaticities = file.header().get("chromaticities", _SRGB_CHROMATICITIES)
     except (RuntimeError, ValueError, OSError) as error:
         raise FsidError(f"{path}: cannot be read as OpenEXR ({error})") from None
-    names = ("R", "G", "B") if "R" in channels else ("Y", "Y", "Y")
-    if not all(name in channels for name in names):
-        raise FsidError(
-            f"{path}: has the channels {', '.join(sorted(channels))}; R, G and B (or Y) are needed"
-        )
+    colours = _light_of(path, parts)
     if not np.allclose(chromaticities, _SRGB_CHROMATICITIES, atol=2e-3):
         raise FsidError(f"{path}: its primaries are not those of sRGB (Rec. 709); convert it to linear sRGB")
-    if len({channels[name].shape for name in names}) > 1:
+    if len({colour.shape for colour in colours}) > 1:
         raise FsidError(f"{path}: its channels differ in size (subsampled chroma); write plain R, G, B")
-    pixels = np.stack([channels[name] for name in names], axis=-1)
+    pixels = np.stack(colours, axis=-1).astype(np.float32)
     height, width = (size // 2 * 2 for size in pixels.shape[:2])
     if min(height, width) < _SMALLEST_PX:
         raise FsidError(f"{path}: is {pixels.shape[1]}x{pixels.shape[0]} pixels, at least 32x32 are needed")
     if not np.isfinite(pixels).all():
         raise FsidError(f"{path}: holds NaN or infinite values; render it again")
     return pixels[:height, :width].clip(min=0)
+
+
+def _light_of(path: Path, parts: list[dict[str, np.ndarray]]) -> list[np.ndarray]:
+    """Red, green and blue of the layer that holds the light; three times the same where it is grey."""
+    layers: dict[str, list[np.ndarray]] = {}
+    for channels in parts:
+        for name in channels:
+            layer, _, last = name.rpartition(".")
+            prefix = name[: -len(last)]
+            is_grey = last == "Y" and prefix + "X" not in channels  # else a vector
+            names = [name] * 3 if is_grey else [prefix + colour for colour in "RGB"]
+            if (last == "R" or is_grey) and all(n in channels for n in names):
+                layers.setdefault(layer, [channels[n] for n in names])
+    beauty = [layer for layer in layers if layer.rpartition(".")[2] == _BEAUTY]
+    for layer in ("", *beauty, *(layers if len(layers) == 1 else ())):
+        if layer in layers:
+            return layers[layer]
+    if layers:
+        raise FsidError(f"{path}: has the layers {', '.join(sorted(layers))}; write one of them alone")
+    found = sorted(name for channels in parts for name in channels)
+    raise FsidError(f"{path}: has the channels {', '.join(found)}; R, G and B (or Y) are needed")
