@@ -13,10 +13,12 @@ from PIL import Image
 from fsid.cli.libraries import read_mesh_folders
 from fsid.cli.main import main
 from fsid.cli.progress import progress_bar
-from fsid.dataset import generate_config, shard_path
+from fsid.dataset import contact_sheet, generate_config, shard_path
+from fsid.dataset.sample import make_sample, to_uint8
 from fsid.dataset.shards import read_samples
 from fsid.errors import FsidError
 from fsid.scene import SceneConfig
+from fsid.sensor import develop
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 
@@ -53,6 +55,21 @@ def test_only_makes_the_same_bytes_from_a_key_and_from_json(data: Path, tmp_path
     assert loose(tmp_path / "again", "00000003") == stored
     main([*(word.replace("/data", "/elsewhere") for word in words(data)), "--only", "3"])
     assert loose(data / "elsewhere", "00000003") == stored
+
+
+def test_a_contact_sheet_shows_the_samples_in_order_made_twice_as_large(photos: Path) -> None:
+    """Pixel by pixel, fine texture behind a mosaic is full of false colour."""
+    small, large = (
+        generate_config(None, [f"width={width}", f"height={height}", f"images={photos}"])
+        for width, height in ((64, 48), (128, 96))
+    )
+    sheet = contact_sheet(small, 0, 3)
+    assert sheet.shape == (2 * 48 + 4, 2 * 64 + 4, 3)
+    for number, (top, left) in enumerate([(0, 0), (0, 68), (52, 0)]):
+        frame = Image.fromarray(to_uint8(develop(make_sample(large, 0, number, None).clean)))
+        reduced = np.asarray(frame.reduce(2), np.int16)
+        assert np.abs(sheet[top : top + 48, left : left + 64] - reduced).max() <= 1
+    assert (sheet[52:, 68:] == 255).all()
 
 
 def test_meshes_that_are_skipped_are_counted_and_the_first_is_named(

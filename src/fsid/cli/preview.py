@@ -25,6 +25,8 @@ def preview(
 ) -> None:
     """Render scenes 0 .. COUNT-1 of a seed into one picture, without noise: what a dataset would hold.
 
+    Each is rendered twice as wide and high and then reduced, as photographs are looked at.
+
     Args:
         output: PNG file to write.
         count: Number of scenes.
