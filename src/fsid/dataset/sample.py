@@ -100,7 +100,9 @@ def _further_file(name: str, content: Raw | np.ndarray) -> tuple[str, bytes]:
 
 def to_uint8(srgb: np.ndarray) -> np.ndarray:
     """(..., 3) sRGB-encoded 0..1 as 8-bit values."""
-    return np.round(np.clip(srgb, 0.0, 1.0) * 255.0).astype(np.uint8)
+    levels = np.clip(srgb, 0.0, 1.0)
+    levels *= 255.0
+    return np.round(levels, out=levels).astype(np.uint8)
 
 
 def _dng(raw: Raw) -> bytes:

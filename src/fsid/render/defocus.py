@@ -33,44 +33,48 @@ def defocus(
 
     aperture_m: diameter of the opening. focus_m: depth of the sharp plane. focal_px: focal length in pixels.
     """
-    nearness = 1 / depth.astype(np.float64) - 1 / focus_m
-    blur = nearness * aperture_m * focal_px / 4  # above 0 before the sharp plane
-    place = np.interp(blur**2, _SIGMA_PX**2, np.arange(len(_SIGMA_PX))) * np.sign(blur)
-    seen = np.zeros((*depth.shape, 4), np.float32)  # what lies behind the next layer: light * known, known
+    blur = (1 / depth - np.float32(1 / focus_m)) * np.float32(aperture_m * focal_px / 4)
+    place = np.interp(blur**2, _SIGMA_PX**2, np.arange(len(_SIGMA_PX))).astype(np.float32)
+    np.copysign(place, blur, out=place)  # above 0 before the sharp plane
+    seen = np.zeros((4, *depth.shape), np.float32)  # what lies behind the next layer: light * known, known
     for layer in range(int(np.floor(place.min())), int(np.ceil(place.max())) + 1):
         sigma_px = float(_SIGMA_PX[abs(layer)])
         window = _window(np.abs(place - layer) < 1, int(np.ceil(_TRUNCATE * sigma_px)) + 4)
         if window is None:
             continue
-        ahead = (place[window] - layer).astype(np.float32)
-        parts = np.empty((*ahead.shape, 5), np.float32)  # light, this layer, all that is not farther
-        np.maximum(1 - np.abs(ahead), 0, out=parts[..., 3])
-        np.clip(ahead + 1, 0, 1, out=parts[..., 4])
-        np.multiply(radiance[window], parts[..., 3:4], out=parts[..., :3])
-        parts = _blurred(parts, sigma_px)
-        front, own = parts[..., :4], parts[..., 3]
-        cover = np.minimum(own / _SEEN, parts[..., 4])
-        behind = _continued(seen[window], sigma_px if layer > 0 and sigma_px > _SHORT_PX else 0.0)
-        behind *= (1 - cover)[..., None]
-        front *= (cover / np.maximum(own, _NONE))[..., None]
-        np.add(behind, front, out=seen[window])
-    return seen[..., :3] / np.maximum(seen[..., 3:], _NONE)
+        ahead = place[window] - np.float32(layer)
+        share = np.maximum(1 - np.abs(ahead), 0)
+        own = _blurred(share, sigma_px)
+        cover = _blurred(np.clip(ahead + 1, 0, 1), sigma_px)  # all that is not farther
+        np.minimum(cover, own / _SEEN, out=cover)
+        behind = [plane[window] for plane in seen]
+        _continue(behind, sigma_px if layer > 0 and sigma_px > _SHORT_PX else 0.0)
+        front = cover / np.maximum(own, _NONE)
+        for colour, plane in enumerate(behind):
+            plane *= 1 - cover
+            light = own if colour == 3 else _blurred(radiance[window][..., colour] * share, sigma_px)
+            plane += light * front
+    seen[:3] /= np.maximum(seen[3], _NONE)
+    return np.ascontiguousarray(seen[:3].transpose(1, 2, 0))
 
 
-def _continued(seen: np.ndarray, sigma_px: float) -> np.ndarray:
-    """`seen` (H, W, 4) with what is not known taken from about `sigma_px` beside it, where anything is known.
+def _continue(seen: list[np.ndarray], sigma_px: float) -> None:
+    """Take what is not known in `seen`, four planes (H, W), from about `sigma_px` beside it, in place.
 
     What lies behind the sharp plane reaches under what hides it by its own blur already: there 0 is enough.
     """
-    known = seen[..., 3]
+    known = seen[3]
     if sigma_px == 0:
-        return seen * np.maximum(np.minimum(1 / _SEEN, 1 / np.maximum(known, _NONE)), 1.0)[..., None]
-    beside = _blurred(seen, sigma_px)
-    there = beside[..., 3]
-    missing = np.minimum(there / _SEEN, 1.0) - np.minimum(known, 1.0)
-    beside *= (np.maximum(missing, 0.0) / np.maximum(there, _NONE))[..., None]
-    beside += seen
-    return beside
+        scale = np.clip(1 / np.maximum(known, _NONE), 1, 1 / _SEEN)
+        for plane in seen:
+            plane *= scale
+        return
+    there = _blurred(known, sigma_px)
+    missing = np.minimum(there / _SEEN, 1) - np.minimum(known, 1)
+    share = np.maximum(missing, 0) / np.maximum(there, _NONE)
+    for plane in seen[:3]:
+        plane += _blurred(plane, sigma_px) * share
+    known += there * share
 
 
 def _window(mask: np.ndarray, margin: int) -> tuple[slice, slice] | None:
@@ -83,12 +87,12 @@ def _window(mask: np.ndarray, margin: int) -> tuple[slice, slice] | None:
 
 
 def _blurred(image: np.ndarray, sigma_px: float) -> np.ndarray:
-    """(H, W, C) through a Gaussian; wide ones at half the resolution."""
+    """(H, W) through a Gaussian; wide ones at half the resolution."""
     if sigma_px == 0:
         return image
-    if sigma_px >= _COARSE_PX and min(image.shape[:2]) >= 64:
+    if sigma_px >= _COARSE_PX and min(image.shape) >= 64:
         left = np.sqrt(sigma_px**2 - _COARSE_VARIANCE)
-        return _finer(_blurred(_halved(image), float(left) / 2), image.shape[:2])
+        return _finer(_blurred(_halved(image), float(left) / 2), image.shape)
     for axis in (0, 1):
         if sigma_px < _SHORT_PX:  # a sampled Gaussian would be too narrow
             side = sigma_px**2 / 2
@@ -99,8 +103,8 @@ def _blurred(image: np.ndarray, sigma_px: float) -> np.ndarray:
 
 
 def _halved(image: np.ndarray) -> np.ndarray:
-    height, width = image.shape[:2]
-    even = np.pad(image, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
+    height, width = image.shape
+    even = np.pad(image, ((0, height % 2), (0, width % 2)), mode="edge")
     rows = even[0::2] + even[1::2]
     return np.asarray((rows[:, 0::2] + rows[:, 1::2]) * np.float32(0.25))
 

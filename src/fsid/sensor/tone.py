@@ -15,11 +15,22 @@ import numpy as np
 
 from fsid.sensor.arrays import lookup, namespace
 
+_BLOCK = 1 << 16
 _ENTRIES = 1 << 16  # i / 65535: every value of an 8-bit or 16-bit photo, exactly
 
 
 def srgb_encode(linear: Any) -> Any:
     """Linear 0..1 (clipped to that) to sRGB-encoded 0..1, float32."""
+    if isinstance(linear, np.ndarray) and linear.size > _BLOCK and len(linear) > 1:
+        encoded = np.empty(linear.shape, np.float32)
+        rows = max(_BLOCK * len(linear) // linear.size, 1)
+        for start in range(0, len(linear), rows):  # of a large image, parts that a cache holds
+            encoded[start : start + rows] = _srgb_encoded(linear[start : start + rows])
+        return encoded
+    return _srgb_encoded(linear)
+
+
+def _srgb_encoded(linear: Any) -> Any:
     v = _unit(linear)
     root = v.clip(min=0.0031308) ** (1 / 2.4)
     return namespace(v).where(v <= 0.0031308, 12.92 * v, 1.055 * root - 0.055)
