@@ -105,7 +105,7 @@ class Renderer:
         table = tap_table(quality)
         self._taps = context.texture((table.shape[1], table.shape[0]), 2, table.tobytes(), dtype="f4")
         self._taps.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        self._shadows = ShadowPass(context, quality, grid, self._taps)
+        self._shadows = ShadowPass(context, quality, grid, self._taps, self._drain.run)
         self._samples = SamplePass(context)
         self._occlusion = OcclusionPass(context, quality, grid, self._taps)
         self._shade = ShadePass(context, quality, grid, self._shadows)

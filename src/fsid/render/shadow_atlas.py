@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import moderngl
@@ -10,8 +11,10 @@ import moderngl
 class ShadowAtlas:
     """One depth image that holds the tiles of all lights, and its moments at half the size."""
 
-    def __init__(self, context: moderngl.Context) -> None:
+    def __init__(self, context: moderngl.Context, drain: Callable[[], None]) -> None:
+        """drain: called when an image was freed, so that the driver does not hold it (`Drain.run`)."""
         self._context = context
+        self._drain = drain
         self._size = (0, 0)
         self._owned: list[Any] = []
         self._sampler = context.sampler(
@@ -24,6 +27,8 @@ class ShadowAtlas:
             return
         for item in self._owned:
             item.release()
+        if self._owned:
+            self._drain()
         self._depth = self._context.depth_texture(size)
         self._depth.compare_func = ""
         self._depth.filter = (moderngl.NEAREST, moderngl.NEAREST)

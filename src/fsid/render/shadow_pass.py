@@ -3,7 +3,7 @@ the share of each light that reaches one sample per block of 2 x 2 pixels, which
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import moderngl
 import numpy as np
@@ -21,15 +21,21 @@ from fsid.render.targets import Targets
 
 
 class ShadowPass:
-    """Owns the atlas. taps: the texture of `fsid.render.quality.tap_table`. grid: as in `Targets`."""
+    """Owns the atlas. taps: the texture of `fsid.render.quality.tap_table`. grid: as in `Targets`. drain: as
+    in `ShadowAtlas`."""
 
     def __init__(
-        self, context: moderngl.Context, quality: Quality, grid: int, taps: moderngl.Texture
+        self,
+        context: moderngl.Context,
+        quality: Quality,
+        grid: int,
+        taps: moderngl.Texture,
+        drain: Callable[[], None],
     ) -> None:
         self._context = context
         self._quality = quality
         self._taps = taps
-        self._atlas = ShadowAtlas(context)
+        self._atlas = ShadowAtlas(context, drain)
         self._depth = load_program(context, "depth.vert", None)
         self._moments = load_program(context, "screen.vert", "moments.frag")
         self._blocks = load_program(context, "screen.vert", "shadow_blocks.frag", LENS=0, GRID=grid)
