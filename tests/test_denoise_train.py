@@ -28,7 +28,8 @@ from fsid.denoise import (  # noqa: E402
     load_history,
     train,
 )
-from fsid.denoise.train import learning_rate  # noqa: E402
+from fsid.denoise.stabilise import stabilise, unstabilise  # noqa: E402
+from fsid.denoise.train import learning_rate, noise_left  # noqa: E402
 from fsid.denoise.validate import held_out, validation  # noqa: E402
 from fsid.errors import FsidError  # noqa: E402
 from fsid.sensor import Raw, add_noise, clean_levels, load_profile, write_dng  # noqa: E402
@@ -72,6 +73,17 @@ def stored(rng: np.random.Generator, number: int) -> tuple[str, dict[str, bytes]
     buffer = io.BytesIO()
     write_dng(buffer, clean_levels(patches_of_colour(rng)))
     return f"{number:08d}", {"clean.dng": buffer.getvalue()}
+
+
+def test_the_loss_is_the_share_of_the_variance_of_the_noise_that_is_left() -> None:
+    """A dark patch of a quiet camera, a bright one of a noisy camera; a fifth and all of the noise left."""
+    k, sigma2 = torch.tensor([[1e-4] * 4, [1e-2] * 4]), torch.tensor([[1e-6] * 4, [1e-4] * 4])
+    levels = k[..., None, None], sigma2[..., None, None]
+    clean = torch.tensor([0.05, 0.7]).reshape(2, 1, 1, 1).expand(2, 4, 64, 64)
+    noise = torch.randn(clean.shape, generator=torch.Generator().manual_seed(1))
+    left = torch.tensor([0.2, 1.0]).reshape(2, 1, 1, 1)
+    estimate = unstabilise(stabilise(clean, *levels) + left * noise, *levels)
+    assert noise_left(estimate, clean, k, sigma2).item() == pytest.approx((0.2**2 + 1) / 2, rel=0.03)
 
 
 @pytest.fixture(scope="module")
