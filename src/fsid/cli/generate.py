@@ -77,7 +77,7 @@ def generate(
         dry_run: Measure a few pairs, print the estimated time, size and number of shards, and write nothing.
         quiet: No progress bar.
     """
-    from fsid.dataset import Workforce, estimate, generate_config, make_only
+    from fsid.dataset import Workforce, dataset_config, estimate, generate_config, make_only
     from fsid.dataset import generate as generate_dataset
 
     given = {
@@ -99,6 +99,7 @@ def generate(
     if count is None or count < 1:
         raise FsidError("--count: say how many pairs the dataset is to have, at least 1")
     settings, workforce = generate_config(config, overrides), Workforce(workers, ray, workers_per_gpu)
+    dataset_config(settings, seed)  # names what does not exist before a library of meshes is read
     if not settings.images:
         read_mesh_folders(settings.scene, quiet=quiet)
     if dry_run:

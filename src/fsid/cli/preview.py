@@ -38,11 +38,12 @@ def preview(
         variant: What varies between scenes.
         quiet: No progress bar.
     """
-    from fsid.dataset import check_png, contact_sheet, generate_config, save_png
+    from fsid.dataset import check_png, contact_sheet, dataset_config, generate_config, save_png
 
     check_png(output)
     overrides = [*set, f"width={width}", f"height={height}", f"variant={variant}"]
     settings = generate_config(config, overrides)
+    dataset_config(settings, seed)
     read_mesh_folders(settings.scene, quiet=quiet)
     with progress_bar("scenes", "scenes", quiet=quiet) as progress:
         save_png(output, contact_sheet(settings, seed, count, progress=progress))

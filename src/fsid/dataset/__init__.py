@@ -3,7 +3,7 @@
 from fsid.dataset.attempt import Sample, sample_key
 from fsid.dataset.config import DatasetConfig, GenerateConfig, generate_config
 from fsid.dataset.estimate import Estimate, estimate
-from fsid.dataset.generate import Workforce, generate
+from fsid.dataset.generate import Workforce, dataset_config, generate
 from fsid.dataset.only import make_only
 from fsid.dataset.photos import find_photos, read_photo
 from fsid.dataset.picture import check_png, contact_sheet, grid, save_png
@@ -19,6 +19,7 @@ __all__ = [
     "Workforce",
     "check_png",
     "contact_sheet",
+    "dataset_config",
     "encode",
     "estimate",
     "find_photos",
