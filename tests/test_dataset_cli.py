@@ -72,6 +72,15 @@ def test_a_contact_sheet_shows_the_samples_in_order_made_twice_as_large(photos: 
     assert (sheet[52:, 68:] == 255).all()
 
 
+def test_a_contact_sheet_has_room_for_upright_photographs(tmp_path: Path) -> None:
+    for name, size in (("lying", (96, 64)), ("upright", (64, 96))):
+        Image.new("RGB", size, (90, 120, 60)).save(tmp_path / f"{name}.png")
+    config = generate_config(None, ["width=96", "height=96", f"images={tmp_path}"])
+    sheet = contact_sheet(config, 0, 2)
+    assert sheet.shape == (48, 2 * 48 + 4, 3)
+    assert [(sheet[:, left : left + 48] < 255).all(2).sum() for left in (0, 52)] == [48 * 32] * 2
+
+
 def test_meshes_that_are_skipped_are_counted_and_the_first_is_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -68,14 +68,14 @@ def _half(image: np.ndarray) -> np.ndarray:
 
 
 def grid(tiles: list[np.ndarray]) -> np.ndarray:
-    """Equally sized (h, w, 3) uint8 tiles side by side, about as many columns as rows, on white."""
+    """(h, w, 3) uint8 tiles side by side, about as many columns as rows, on white; room for the largest."""
     columns = int(np.ceil(np.sqrt(len(tiles))))
     rows = int(np.ceil(len(tiles) / columns))
-    height, width = tiles[0].shape[:2]
+    height, width = (max(tile.shape[axis] for tile in tiles) for axis in (0, 1))
     sheet = np.full(
         (rows * (height + GAP_PX) - GAP_PX, columns * (width + GAP_PX) - GAP_PX, 3), 255, np.uint8
     )
     for i, tile in enumerate(tiles):
         top, left = (i // columns) * (height + GAP_PX), (i % columns) * (width + GAP_PX)
-        sheet[top : top + height, left : left + width] = tile
+        sheet[top : top + len(tile), left : left + tile.shape[1]] = tile
     return sheet
