@@ -7,11 +7,12 @@ read noise of the built-in profiles, each at its lowest published ISO with sigma
 site: fits of noise that could not be told from none.) Smooth: one object, and radiance within 3 % over 5 x
 5 pixels.
 
-Measured at 480 x 480 pixels, other taps and other phase: 92.1 % and 95.9 % of smooth pixels below the 5 %;
-95th percentile 3.6e-5 and 7.0e-6; root mean square of the fine grain 4.1e-5 and 3.1e-5, which is 18 % and
-13 % of that read noise. With other taps of shadows alone 99.3 %; what is left is occlusion: its taps are
-points, and how many of them an occluder covers changes with their places, smoothly from pixel to pixel.
-Another phase also sees the curvature of a smooth image, more of it the fewer the pixels.
+Measured at 480 x 480 pixels, other taps and other phase: 93.1 % and 95.9 % of smooth pixels below the 5 %;
+95th percentile 2.5e-5 and 6.9e-6; root mean square of the fine grain 1.7e-5 and 1.5e-5, which is 7.4 % and
+6.6 % of that read noise, and 3.6 % and 4.2 % where the radiance is within 1 %. With other taps of shadows
+alone 99.7 %; what is left is occlusion, and it is no grain: its taps are points, and how many of them an
+occluder covers changes with their places, smoothly from pixel to pixel. Another phase also sees the
+curvature of a smooth image, more of it the fewer the pixels.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ from render_scenes import FROM_ABOVE, bake_plain, block, grid, lambertian, point
 
 READ_NOISE = 2.33e-4
 LIMIT = 0.05 * READ_NOISE
-GRAIN = 0.25 * READ_NOISE
+GRAIN = 0.1 * READ_NOISE
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +84,7 @@ def test_other_taps_give_the_same_picture(renderer: Renderer) -> None:
     after = renderer.draw(scene(), bake=bake_plain)
     renderer._taps.write(taps.tobytes())
     image = before.radiance[..., 0].astype(float)
-    check(after.radiance[..., 0] - image, image, before.object_id, 0.91)
+    check(after.radiance[..., 0] - image, image, before.object_id, 0.925)
     assert (after.radiance != before.radiance).any()
 
 

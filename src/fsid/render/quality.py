@@ -1,6 +1,7 @@
 """How much work goes into a frame: numbers of taps and sizes of shadow maps.
 
-All taps lie on sunflower spirals (Vogel 1979), the same for every pixel: no dither, no noise.
+All taps lie on sunflower spirals (Vogel 1979), the same for every pixel: no dither, no noise. Those of
+occlusion are four, one for each block of a square of 2 x 2; what they differ by is smoothed away.
 """
 
 from __future__ import annotations
@@ -8,6 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+
+_GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
 
 
 @dataclass(frozen=True)
@@ -36,7 +39,7 @@ def tap_table(quality: Quality) -> np.ndarray:
     rows = (
         spiral(quality.search_taps),
         spiral(quality.filter_taps),
-        spiral(quality.occlusion_taps, 1.0),
+        woven_spirals(quality.occlusion_taps),
     )
     table = np.zeros((3, max(len(row) for row in rows), 2), np.float32)
     for target, row in zip(table, rows, strict=True):
@@ -44,9 +47,19 @@ def tap_table(quality: Quality) -> np.ndarray:
     return table
 
 
-def spiral(count: int, growth: float = 0.5) -> np.ndarray:
-    """(count, 2) points of a sunflower spiral on the unit disc, centred; radius ~ index^growth."""
+def spiral(count: int) -> np.ndarray:
+    """(count, 2) points of a sunflower spiral on the unit disc, centred."""
     i = np.arange(count)
-    radius, angle = ((i + 0.5) / count) ** growth, i * np.pi * (3 - np.sqrt(5))
-    points = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
+    points = _polar(np.sqrt((i + 0.5) / count), i * _GOLDEN_ANGLE)
     return np.asarray(points - points.mean(0))
+
+
+def woven_spirals(count: int) -> np.ndarray:
+    """(4 * count, 2) points of the unit disc, radius ~ index: every fourth belongs to the same spiral, all
+    together are one."""
+    i = np.arange(4 * count)
+    return _polar((i + 0.5) / (4 * count), i * _GOLDEN_ANGLE)
+
+
+def _polar(radius: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)

@@ -32,12 +32,12 @@ Blocks blocks_around(Sample p) {
     return b;
 }
 
-// Openness of the blocks that lie at this depth: the blur of the fixed tap pattern stops at edges.
+// Openness between the blocks, at edges of those that lie at this depth: the blur of the tap pattern stops there.
 float openness(Blocks b, float depth) {
     float sum = 0.0, total = 0.0;
     for (int i = 0; i < 4; ++i) {
         vec2 o = texelFetch(occlusion, b.at[i], 0).xy;
-        float d = (o.y - depth) / (0.02 * depth);
+        float d = b.even ? 0.0 : (o.y - depth) / (0.02 * depth);
         float w = (b.share[i] + 1e-3) / (1e-3 + d * d);
         sum += w * o.x;
         total += w;

@@ -1,7 +1,8 @@
 #version 430 core
 // Share of the surroundings that each block of 2 x 2 pixels sees: scalable ambient obscurance (McGuire et al.
-// 2012) with one fixed spiral of taps for all blocks. What the fixed pattern leaves of the outlines of
-// occluders is smoothed by blur.frag. Output: openness 0..1, depth (0 = no hit).
+// 2012) with four fixed spirals of taps, one for each block of a square of 2 x 2. What they differ by, and what
+// they leave of the outlines of occluders, is smoothed by blur.frag, whose weights take equal shares of all four.
+// Output: openness 0..1, depth (0 = no hit).
 #include "encoding.glsl"
 layout(binding = 0) uniform usampler2D samples;
 layout(binding = 1) uniform sampler2D depth;    // metres, of the blocks; 0 = no hit
@@ -32,9 +33,10 @@ void main() {
     float reach = min(0.5 * RADIUS_M * focal.x / max(p.z, 1e-3), MAX_SCREEN) * float(size.x);
     float r2 = RADIUS_M * RADIUS_M, sum = 0.0;
     float floor_m = 0.004 + 0.003 * p.z;
+    int spiral = (block.x & 1) + 2 * (block.y & 1);
     int i = 0, count = hit ? taps : 0;
     do {
-        vec2 tap = texelFetch(tap_table, ivec2(i, 2), 0).xy;
+        vec2 tap = texelFetch(tap_table, ivec2(4 * i + spiral, 2), 0).xy;
         ivec2 other = clamp(block + ivec2(round(tap * reach)), ivec2(0), size - 1);
         bool other_hit;
         vec3 v = at(other, other_hit) - p;

@@ -13,6 +13,7 @@ const float SHARP_TEXELS = 3.0, SOFT_TEXELS = 8.0;   // radius of the penumbra: 
 const float LEAK = 0.1;          // share of light that overlapping occluders let through, cut off
 const float STEEPEST = 12.0;     // tangent of the steepest receiver that is followed
 const float DARK = 0.98;         // share of the search that is blocked where nothing more is looked for
+const float TRACE = 1e-4, BEGUN = 0.003;   // blocked taps of the search: below no shadow, above the filter's; blended between
 const int TILE_COLUMNS = 6;
 
 // Where a receiver is in its tile. u = 1 - window depth is near / z (of the sun: 1 - z / range), which is
@@ -115,8 +116,8 @@ float visibility(Light light, vec3 position, vec3 face_normal, bool wanted, out 
         blocked_sum += i < taps ? blocked : 0.0;
     } while (++i < taps);
     bool dark = shaded > DARK * float(search_taps);
-    bool mixed = shaded >= 1e-4 && !dark;
-    float nearer = max(blocked_sum / max(shaded, 1e-4) - r.u, 0.0);
+    bool mixed = shaded >= TRACE && !dark;
+    float nearer = max(blocked_sum / max(shaded, TRACE) - r.u, 0.0);
     mat2 spread = r.spread * nearer;
     float size = max(length(spread[0]), length(spread[1]));
     float wide = clamp(size, 0.75 * r.texel, r.search);
@@ -142,6 +143,7 @@ float visibility(Light light, vec3 position, vec3 face_normal, bool wanted, out 
     float dim = 1.0 - soft_lit;
     soft_lit = max(soft_lit - LEAK * dim * dim * dim, 0.0);
     float lit = mix(sharp_lit / float(filter_taps), soft_lit, soft);
+    lit = mix(1.0, lit, smoothstep(TRACE, BEGUN, shaded));
     float even = r.inside ? mixed ? 0.5 * (wide + r.texel) : taps > 0 ? r.search : 1.2 * r.search : 1e9;
     even_m = wanted ? even * (light.kind == SUN ? 1.0 : SHADOW_NEAR / r.u) : 0.0;
     return mixed ? lit : dark ? 0.0 : 1.0;
