@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +17,6 @@ from fsid.dataset.config import Checks, split_of
 from fsid.dataset.settle import REDRAWS, settle
 from fsid.dataset.shards import read_records, read_samples
 from fsid.errors import FsidError
-from fsid.render import Frame
 from fsid.scene import Scene
 from fsid.sensor import Raw, mosaic, pack
 
@@ -35,7 +33,7 @@ class Painter:
     def __init__(self, bad: int = 0) -> None:
         self.frames, self._bad = 0, bad
 
-    def render(self, scene: Scene, camera_index: int = 0, flow_to: int | None = None) -> Frame:
+    def radiance(self, scene: Scene, camera_index: int = 0) -> np.ndarray:
         camera = scene.cameras[camera_index]
         rng = np.random.default_rng(scene.seed)
         coarse = rng.uniform(0.05, 1.0, (camera.height // 8 + 1, camera.width // 8 + 1, 3))
@@ -43,8 +41,7 @@ class Painter:
         self.frames += 1
         if self.frames <= self._bad:
             light[0, 0] = np.nan
-        plane = np.zeros(light.shape[:2], np.float32)
-        return Frame(light, light, light, plane, plane.astype(np.int32))
+        return light
 
 
 def test_a_frame_gives_crops_times_exposures_times_noise_levels() -> None:
@@ -103,10 +100,9 @@ def test_frames_that_never_pass_are_one_line() -> None:
 
 
 class Dark(Painter):
-    def render(self, scene: Scene, camera_index: int = 0, flow_to: int | None = None) -> Frame:
-        frame = super().render(scene, camera_index, flow_to)
-        light = np.where(np.arange(frame.radiance.shape[1])[:, None] < 40, 0, frame.radiance)
-        return replace(frame, radiance=light.astype(np.float32))
+    def radiance(self, scene: Scene, camera_index: int = 0) -> np.ndarray:
+        light = super().radiance(scene, camera_index)
+        return np.where(np.arange(light.shape[1])[:, None] < 40, 0, light).astype(np.float32)
 
 
 def clean(x: np.ndarray) -> Raw:

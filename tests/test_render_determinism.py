@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from ctypes import c_int, c_uint, c_void_p
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from fsid.render import Frame, Renderer
 from fsid.render.layers import MOST_LAYERS, LayerStore, fitting_size
 from fsid.render.texels import bake_texels, level_ranges
 from fsid.render.texture_array import TextureArray, gl
-from fsid.scene import LightConfig, Scene, SceneConfig, sample
+from fsid.scene import LensConfig, LightConfig, MotionConfig, Scene, SceneConfig, sample
 
 CONFIG = SceneConfig(objects=(6, 8))
 
@@ -47,6 +48,19 @@ def test_again_and_after_other_scenes(renderer: Renderer) -> None:
     )
     assert fingerprint(renderer.render(scene(3))) != first
     assert fingerprint(renderer.render(scene(1))) == first
+
+
+@pytest.mark.parametrize(
+    "config",
+    [
+        CONFIG,
+        replace(CONFIG, lens=LensConfig(blur_share=1.0, soft_share=1.0)),
+        replace(CONFIG, motion=MotionConfig(exposure_s=(0.1, 0.1), moving_share=1.0)),
+    ],
+)
+def test_radiance_alone_is_that_of_the_frame(renderer: Renderer, config: SceneConfig) -> None:
+    drawn = sample(config, 4, width=96, height=64)
+    assert (renderer.radiance(drawn) == renderer.render(drawn).radiance).all()
 
 
 def test_slots_of_materials_do_not_matter(renderer: Renderer) -> None:

@@ -32,12 +32,12 @@ MOVING_SHARE = 0.3
 
 
 class SceneRenderer(Protocol):
-    """Anything that turns a scene into a frame."""
+    """Anything that turns a scene into light (H, W, 3)."""
 
-    def render(self, scene: Scene, camera_index: int = 0) -> Frame: ...
+    def radiance(self, scene: Scene, camera_index: int = 0) -> np.ndarray: ...
 
 
-class FlowRenderer(Protocol):
+class FlowRenderer(SceneRenderer, Protocol):
     """One that knows where the points of one camera's image are in another's."""
 
     def render(self, scene: Scene, camera_index: int = 0, flow_to: int | None = None) -> Frame: ...
@@ -76,10 +76,10 @@ def views_of_scene(
     """The views of a scene through its first eye."""
     if config.task == "deblur":
         middle = replace(scene, cameras=(replace(scene.cameras[0], exposure_s=0.0),))
-        return Views(renderer.render(middle).radiance, (renderer.render(scene).radiance,))
+        return Views(renderer.radiance(middle), (renderer.radiance(scene),))
     if config.task == "burst":
         return _burst(scene, cast(FlowRenderer, renderer))  # `GenerateConfig` allows no other
-    return views_of_light(rng, config, renderer.render(scene).radiance)
+    return views_of_light(rng, config, renderer.radiance(scene))
 
 
 def views_of_light(rng: np.random.Generator, config: GenerateConfig, light: np.ndarray) -> Views:
@@ -108,7 +108,7 @@ def _burst(scene: Scene, renderer: FlowRenderer) -> Views:
     eye = scene.cameras[0].eye
     frames = [number for number, camera in enumerate(scene.cameras) if camera.eye == eye]
     frames.sort(key=lambda number: scene.cameras[number].frame)
-    truth = renderer.render(scene, frames[0]).radiance
+    truth = renderer.radiance(scene, frames[0])
     others = [renderer.render(scene, number, flow_to=frames[0]) for number in frames[1:]]
     flow = tuple(frame.flow for frame in others if frame.flow is not None)
     return Views(truth, (truth, *(frame.radiance for frame in others)), flow)

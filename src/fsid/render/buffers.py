@@ -20,9 +20,10 @@ class Buffers:
     def __init__(self, context: moderngl.Context, stage: Stage) -> None:
         self._context = context
         geometry, plan = stage.geometry, stage.plan
-        self._world = context.buffer(geometry.world.tobytes())
-        self._vertices = context.buffer(geometry.vertices.tobytes())
-        self._indices = context.buffer(geometry.indices.tobytes())
+        self._world, self._vertices, self._indices = (
+            context.buffer(array.view(np.uint8))
+            for array in (geometry.world, geometry.vertices, geometry.indices)
+        )
         self._owned: list[Any] = [self._world, self._vertices, self._indices]
         self._tables: dict[str, Any] = {
             "surfaces": self._table(surface_texels(geometry.surfaces)),

@@ -61,11 +61,7 @@ def shots_of(
 
     most: images. most_places: places on the lens; 1 is its middle.
     """
-    moving = camera.exposure_s > 0 and (
-        camera.velocity_m_s != ZERO
-        or camera.spin_deg_s != ZERO
-        or any(drawable.motion != UNMOVED for drawable in drawables)
-    )
+    moving = is_moving(camera, drawables)
     count = 0
     if camera.aperture_m > 0:
         across = _blur_px(camera, middle.lens, frame) / LENS_STEP_PX
@@ -87,6 +83,15 @@ def shots_of(
         moved = Lens(lens.rotation, position, lens.focal, lens.seen_px, lens.seen_focal, lens.model, lens.k)
         shots.append(Shot(moved, camera.time_s + since, middle.shift_px, offset, part_m))
     return shots
+
+
+def is_moving(camera: Camera, drawables: Sequence[Drawable]) -> bool:
+    """Whether anything moves while the shutter is open."""
+    return camera.exposure_s > 0 and (
+        camera.velocity_m_s != ZERO
+        or camera.spin_deg_s != ZERO
+        or any(drawable.motion != UNMOVED for drawable in drawables)
+    )
 
 
 def _motion_px(camera: Camera, drawables: Sequence[Drawable], frame: Frame, sample: float) -> float:

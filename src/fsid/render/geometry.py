@@ -7,7 +7,7 @@ place, colours and texture layer, so that neither objects nor materials need a c
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -64,6 +64,15 @@ class Geometry:
     surfaces: np.ndarray
     ranges: np.ndarray
     spheres: np.ndarray
+
+    def without_vertices(self) -> Geometry:
+        """What is still asked for when vertices and indices are on the device."""
+        return replace(
+            self,
+            world=self.world[:0].copy(),
+            vertices=self.vertices[:0].copy(),
+            indices=self.indices[:0].copy(),
+        )
 
 
 def merge(drawables: Sequence[Drawable], layer_of: Callable[[Material], Layer], time_s: float) -> Geometry:

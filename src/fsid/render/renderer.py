@@ -26,7 +26,7 @@ from fsid.render.context import GlInfo, gl_info, open_context, return_free_block
 from fsid.render.defocus import defocus
 from fsid.render.drain import Drain
 from fsid.render.drawable import View, view_of
-from fsid.render.exposure import Shot, shots_of
+from fsid.render.exposure import Shot, is_moving, shots_of
 from fsid.render.flow import flow_between
 from fsid.render.frame import Frame
 from fsid.render.layers import Layer, LayerStore, fitting_size
@@ -157,25 +157,31 @@ class Renderer:
         )
         return replace(frame, flow=flow)
 
+    def radiance(self, scene: Scene, camera_index: int = 0) -> np.ndarray:
+        """(H, W, 3), the `radiance` of `render` alone, the same bits: labels stay on the device, which takes
+        less time and memory. Raises FsidError for a scene that cannot be drawn."""
+        return self.draw(view_of(scene, camera_index), labels=False).radiance
+
     def draw(
         self,
         view: View,
         *,
         bake: Bake = bake_texels,
         shift_px: tuple[float, float] = (0.0, 0.0),
+        labels: bool = True,
         mark: Mark = lambda stage: None,
     ) -> Frame:
         """The frame of a view; `render` without the scene.
 
         bake: where the texels of materials come from. shift_px: moves the image by a part of a pixel (right,
-        down).
+        down). labels: False may leave albedo, normal and object_id without pixels.
         """
         if Renderer._active is not self:
             raise FsidError("this Renderer is closed")
         camera = view.camera
         shot = Shot(lens_of(camera), camera.time_s, shift_px)
         self._draw(view, shot, bake, mark)
-        frame = self._targets.read_frame()
+        frame = self._targets.read_frame(labels=labels or is_moving(camera, view.drawables))
         mark("readback")
         most, places = self._quality.shots, self._lens_images
         shots = shots_of(camera, view.drawables, frame, shot, self._label_sample, most, places)
@@ -204,6 +210,7 @@ class Renderer:
         self._targets.resize((view.camera.width, view.camera.height), shot.lens.seen_px)
         self._shadows.resize(stage.plan)
         buffers = Buffers(self._context, stage)
+        stage = replace(stage, geometry=stage.geometry.without_vertices())
         try:
             mark("upload")
             self._shadows.draw(stage, buffers, [shot] if below is None else [shot, below])

@@ -148,16 +148,19 @@ class Targets:
         width, height = self.size
         return np.frombuffer(self._results[0][1].read(), np.float32).reshape(height, width, 4)
 
-    def read_frame(self) -> Frame:
-        """The result, row 0 at the top."""
+    def read_frame(self, *, labels: bool = True) -> Frame:
+        """The result, row 0 at the top. labels: False leaves all but radiance and depth without pixels."""
         pixels = self.read_radiance()
         radiance, depth = np.ascontiguousarray(pixels[..., :3]), pixels[..., 3].copy()
         del pixels  # one image after the other: together they are the largest thing that a frame needs
         depth[depth <= 0] = np.inf
-        labels = self._read_labels(0)
-        albedo, object_id = labels[..., :3] * np.float32(1 / _ID_LEVELS), labels[..., 3].astype(np.int32)
+        if not labels:
+            colours, numbers = np.empty((0, 0, 3), np.float32), np.empty((0, 0), np.int32)
+            return Frame(radiance, colours, colours, depth, numbers)
+        texels = self._read_labels(0)
+        albedo, object_id = texels[..., :3] * np.float32(1 / _ID_LEVELS), texels[..., 3].astype(np.int32)
         object_id -= 1
-        del labels
+        del texels
         normal = self._read_labels(1)[..., :3] * np.float32(2 / _ID_LEVELS)
         normal -= 1
         return Frame(radiance, albedo, normal, depth, object_id)

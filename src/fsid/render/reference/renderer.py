@@ -87,6 +87,10 @@ class ReferenceRenderer:
         radiance = (total / steps * _vignette(camera)[..., None]).astype(np.float32)
         return replace(labels, radiance=soften(radiance, camera.softness_px))
 
+    def radiance(self, scene: Scene, camera_index: int = 0) -> np.ndarray:
+        """(H, W, 3), the `radiance` of `render` alone."""
+        return self.render(scene, camera_index).radiance
+
     def prepare(self, scene: Scene, camera: Camera) -> Prepared:
         """The scene in Mitsuba's memory, diced for a camera; apart from `render` for measuring its time."""
         mi, lens = self._mi, lens_of(camera)
