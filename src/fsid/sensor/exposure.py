@@ -63,5 +63,7 @@ def _to_world(light: np.ndarray) -> np.ndarray:
     lit = luminance > 0
     if not lit.any():
         return np.ones(3, np.float32)
-    mean = (light[lit] / luminance[lit][:, None]).mean(axis=0)
-    return np.clip(np.array(WORLD_RGB, np.float32) / np.maximum(mean, 1e-6), 0.25, 4.0)
+    weights = np.divide(1, luminance, out=np.zeros_like(luminance), where=lit)
+    mean = np.einsum("hwc,hw->c", light, weights, dtype=np.float64) / np.count_nonzero(lit)
+    gains = np.clip(np.array(WORLD_RGB) / np.maximum(mean, 1e-6), 0.25, 4.0)
+    return gains.astype(np.float32)
