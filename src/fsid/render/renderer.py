@@ -192,8 +192,7 @@ class Renderer:
             radiance = np.zeros_like(radiance)
             for part in shots:
                 self._draw(view, part, bake, mark)
-                image = self._targets.read_radiance()
-                radiance += _through_lens(part, camera, image[..., :3], image[..., 3])
+                radiance += _through_lens(part, camera, *self._targets.read_radiance())
             radiance /= np.float32(len(shots))
         return replace(frame, radiance=soften(radiance, camera.softness_px))
 
@@ -262,9 +261,8 @@ class Renderer:
 
 
 def _through_lens(shot: Shot, camera: Camera, radiance: np.ndarray, depth: np.ndarray) -> np.ndarray:
-    """An image as the part of the lens that `shot` stands for shows it. depth: 0 or inf where nothing is."""
+    """An image as the part of the lens that `shot` stands for shows it."""
     if shot.aperture_m == 0:
         return radiance
     focal_px = shot.lens.focal[0] * camera.width / 2
-    depth = np.where(depth > 0, depth, np.float32(np.inf))
     return defocus(radiance, depth, shot.aperture_m, camera.focus_m, focal_px)

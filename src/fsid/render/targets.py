@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import moderngl
@@ -12,6 +12,7 @@ from fsid.errors import FsidError
 from fsid.render.frame import Frame
 
 _ID_LEVELS = 65535
+_STRIP = 64
 
 
 Place = tuple[int, int, int, int]
@@ -143,32 +144,38 @@ class Targets:
             draw_screen()
         framebuffer.scissor = None
 
-    def read_radiance(self) -> np.ndarray:
-        """(H, W, 4): radiance and depth (0: nothing hit), row 0 at the top. A view of what was read."""
+    def read_radiance(self) -> tuple[np.ndarray, np.ndarray]:
+        """(H, W, 3) radiance and (H, W) depth, inf where nothing was hit; row 0 at the top."""
         width, height = self.size
-        return np.frombuffer(self._results[0][1].read(), np.float32).reshape(height, width, 4)
+        radiance, depth = np.empty((height, width, 3), np.float32), np.empty((height, width), np.float32)
+        for rows, texels in self._strips(0, "f4", np.float32):
+            radiance[rows], depth[rows] = texels[..., :3], texels[..., 3]
+        depth[depth <= 0] = np.inf
+        return radiance, depth
 
     def read_frame(self, *, labels: bool = True) -> Frame:
         """The result, row 0 at the top. labels: False leaves all but radiance and depth without pixels."""
-        pixels = self.read_radiance()
-        radiance, depth = np.ascontiguousarray(pixels[..., :3]), pixels[..., 3].copy()
-        del pixels  # one image after the other: together they are the largest thing that a frame needs
-        depth[depth <= 0] = np.inf
-        if not labels:
-            colours, numbers = np.empty((0, 0, 3), np.float32), np.empty((0, 0), np.int32)
-            return Frame(radiance, colours, colours, depth, numbers)
-        texels = self._read_labels(0)
-        albedo, object_id = texels[..., :3] * np.float32(1 / _ID_LEVELS), texels[..., 3].astype(np.int32)
-        object_id -= 1
-        del texels
-        normal = self._read_labels(1)[..., :3] * np.float32(2 / _ID_LEVELS)
-        normal -= 1
+        radiance, depth = self.read_radiance()
+        height, width = depth.shape if labels else (0, 0)
+        albedo, normal = (np.empty((height, width, 3), np.float32) for _ in range(2))
+        object_id = np.empty((height, width), np.int32)
+        if labels:
+            for rows, texels in self._strips(1, "nu2", np.uint16):
+                albedo[rows] = texels[..., :3] * np.float32(1 / _ID_LEVELS)
+                object_id[rows] = texels[..., 3].astype(np.int32) - 1
+            for rows, texels in self._strips(2, "nu2", np.uint16):
+                normal[rows] = texels[..., :3] * np.float32(2 / _ID_LEVELS) - 1
         return Frame(radiance, albedo, normal, depth, object_id)
 
-    def _read_labels(self, which: int) -> np.ndarray:
-        """(H, W, 4) uint16: 0 albedo and object id, 1 normal."""
+    def _strips(self, image: int, dtype: str, kind: type) -> Iterator[tuple[slice, np.ndarray]]:
+        """(rows, (h, W, 4) texels) of an image of the result: together they would be the largest thing that a
+        frame needs."""
         width, height = self.size
-        return np.frombuffer(self._results[0][2 + which].read(), np.uint16).reshape(height, width, 4)
+        framebuffer = self._results[0][0]
+        for first in range(0, height, _STRIP):
+            rows = min(_STRIP, height - first)
+            data = framebuffer.read((0, first, width, rows), 4, attachment=image, dtype=dtype)
+            yield slice(first, first + rows), np.frombuffer(data, kind).reshape(rows, width, 4)
 
     def release_glass(self) -> None:
         """Free what only `begin_glass` needs."""

@@ -20,6 +20,7 @@ def demosaic(mosaic: np.ndarray, cfa: str) -> np.ndarray:
     """Mosaic (H, W), both even and at least 4, to camera RGB (H, W, 3) float32; measured samples are kept."""
     padded = np.pad(mosaic.astype(np.float32, copy=False), _PAD, mode="reflect")
     planes = {(r, c): np.ascontiguousarray(padded[r::2, c::2]) for r in (0, 1) for c in (0, 1)}
+    del padded
     red, gr, gb, blue = site_offsets(cfa)
     out = np.empty((*mosaic.shape, 3), np.float32)
     for (r, c), own, opposite in ((red, 0, 2), (blue, 2, 0)):

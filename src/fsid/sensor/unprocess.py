@@ -73,7 +73,7 @@ def linear_to_camera(
     """
     camera = apply_matrix(srgb_to_camera_matrix(xyz_to_camera), linear_srgb)
     camera /= like(white_balance, camera)
-    return camera.clip(0, 1)
+    return namespace(camera).clip(camera, 0, 1, out=camera)
 
 
 def check_srgb(srgb: Any) -> None:
