@@ -187,3 +187,12 @@ def test_radiance_that_is_no_number_is_refused(bad):
 def test_a_photo_out_of_range_or_shape_is_refused(photo):
     with pytest.raises(FsidError, match="photo"):
         unprocess(photo, np.eye(3), (2.0, 1.0, 1.5))
+
+
+def test_white_balance_of_a_frame_does_not_depend_on_its_size():
+    """Sums over millions of pixels keep their digits."""
+    picture = np.random.default_rng(3).uniform(0.05, 1.0, (30, 40, 3)).astype(np.float32)
+    small, large = (
+        exposure_rand(np.random.default_rng(0), light) for light in (picture, np.tile(picture, (40, 50, 1)))
+    )
+    np.testing.assert_allclose(large / large[1], small / small[1], rtol=1e-5)

@@ -12,7 +12,7 @@ from fsid.errors import FsidError
 from fsid.render.frame import Frame
 
 _ID_LEVELS = 65535
-_STRIP = 64
+_STRIP = 64  # rows read at once
 
 
 Place = tuple[int, int, int, int]

@@ -13,7 +13,7 @@ const float SHARP_TEXELS = 3.0, SOFT_TEXELS = 8.0;   // radius of the penumbra: 
 const float LEAK = 0.1;          // share of light that overlapping occluders let through, cut off
 const float STEEPEST = 12.0;     // tangent of the steepest receiver that is followed
 const float DARK = 0.98;         // share of the search that is blocked where nothing more is looked for
-const float TRACE = 1e-4, BEGUN = 0.003;   // blocked taps of the search: below no shadow, above the filter's; blended between
+const float TRACE = 1e-4, BEGUN = 0.003;   // taps of the search blocked: below no shadow, above all of it
 const int TILE_COLUMNS = 6;
 
 // Where a receiver is in its tile. u = 1 - window depth is near / z (of the sun: 1 - z / range), which is
