@@ -28,7 +28,7 @@ def main() -> None:
     parser.add_argument("--texture-size", type=int, default=256, help="texels per side of a material")
     options = parser.parse_args()
     height = options.width * 9 // 32 * 2
-    config = SceneConfig(lens=LensConfig(blur_share=1.0, soft_share=0.0))
+    config = SceneConfig(lens=LensConfig(blur_share=1.0, soft_share=0.0, sharp_share=0.0))
     scenes = [sample(config, seed, width=options.width, height=height) for seed in range(options.frames)]
     truths = drawn(scenes, options.most, options, step_px=1.0)
     sharp = drawn([without_blur(scene) for scene in scenes], 1, options)

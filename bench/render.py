@@ -71,7 +71,9 @@ def scenes_of(count: int, width: int, height: int, *, plain: bool = False) -> li
             materials=MaterialConfig(lobe_share=0.0),
             background=BackgroundConfig(kind_shares=(1.0, 0.0, 0.0, 0.0)),
             lights=LightConfig(count=(3, 3), kind_shares=(0.6, 0.4, 0.0)),
-            lens=LensConfig(blur_share=0.0, vignetting_share=0.0, fringe_share=0.0),
+            lens=LensConfig(
+                blur_share=0.0, vignetting_share=0.0, fringe_share=0.0, soft_share=0.0, sharp_share=0.0
+            ),
         )
     scenes = [sample(config, seed, width=width, height=height) for seed in range(count)]
     return [of_few_materials(scene, 20) for scene in scenes] if plain else scenes

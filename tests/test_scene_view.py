@@ -100,15 +100,19 @@ def test_objects_move_as_configured():
 
 def test_the_lens_changes_nothing_but_the_lens():
     lens = LensConfig(
-        distortion_share=1.0, blur_share=1.0, vignetting_share=1.0, fringe_share=1.0, soft_share=1.0
+        distortion_share=1.0, blur_share=1.0, vignetting_share=1.0, fringe_share=1.0, sharp_share=1.0
     )
     plain, seen = scene().cameras[0], scene(lens=lens).cameras[0]
     assert seen.distortion is not None
     assert seen.aperture_m > 0
     assert -1 < sum(seen.vignetting) < 0
     assert any(seen.chromatic_aberration)
-    assert 0.2 <= seen.softness_px <= 0.9
-    fields = ("distortion", "aperture_m", "focus_m", "vignetting", "chromatic_aberration", "softness_px")
+    assert 0.4 <= seen.softness_px <= 0.65
+    assert 0.4 <= seen.sharpening <= 1.3
+    fields = (
+        *("distortion", "aperture_m", "focus_m", "vignetting"),
+        *("chromatic_aberration", "softness_px", "sharpening"),
+    )
     assert dataclasses.replace(seen, **{name: getattr(plain, name) for name in fields}) == plain
 
 

@@ -29,6 +29,7 @@ _STRAIGHT = 3
 _WIDEST_TANGENT = 6.0
 _MOST_PIXELS = 3.0
 _MAX_SOFTNESS_PX = 50.0
+_MAX_SHARPENING = 5.0
 
 
 @dataclass(frozen=True)
@@ -63,6 +64,8 @@ def lens_of(camera: Camera, time_s: float | None = None) -> Lens:
         raise FsidError("scene.cameras: exposure_s and aperture_m must be 0 or more, focus_m more than 0")
     if not 0 <= camera.softness_px <= _MAX_SOFTNESS_PX:
         raise FsidError(f"scene.cameras: softness_px {camera.softness_px}: must be 0 .. {_MAX_SOFTNESS_PX:g}")
+    if not 0 <= camera.sharpening <= _MAX_SHARPENING:
+        raise FsidError(f"scene.cameras: sharpening {camera.sharpening}: must be 0 .. {_MAX_SHARPENING:g}")
     forward /= np.linalg.norm(forward)
     right /= np.linalg.norm(right)
     rotation = np.stack([right, np.cross(right, forward), forward])

@@ -91,10 +91,14 @@ class LensConfig:
     """Share with lateral chromatic aberration."""
     fringe: Range = knob((-0.0008, 0.0008), -0.02, 0.02)
     """Magnification of red and of blue relative to green, minus 1."""
-    soft_share: float = knob(0.2, 0.0, 1.0)
-    """Share whose lens is softer than the pixel grid; the rest is as sharp as its pixels."""
-    softness_px: Range = knob((0.2, 0.9), 0.0, 20.0)
+    soft_share: float = knob(1.0, 0.0, 1.0)
+    """Share whose lens has a point spread; the rest is as sharp as its pixels."""
+    softness_px: Range = knob((0.4, 0.65), 0.0, 20.0)
     """Standard deviation of the lens's point spread, pixels of the image."""
+    sharp_share: float = knob(0.9, 0.0, 1.0)
+    """Share of pictures that are sharpened, as published photographs are."""
+    sharpening: Range = knob((0.4, 1.3), 0.0, 5.0)
+    """How much of the detail finer than a pixel or so is added once more."""
 
     def __post_init__(self) -> None:
         check_knobs(self)

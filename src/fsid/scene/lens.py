@@ -47,6 +47,7 @@ def lens_rand(rng: np.random.Generator, config: LensConfig, camera: Camera) -> C
     loss, power = rng.uniform(*config.vignetting), rng.dirichlet((2.0, 1.0, 0.5))
     fringe = rng.uniform(*config.fringe, 2)
     softness_px = float(rng.uniform(*config.softness_px))
+    sharpened, sharpening = rng.random() < config.sharp_share, float(rng.uniform(*config.sharpening))
     if fisheye:
         camera = _fisheye(camera, bend)
     elif distorted:
@@ -59,7 +60,9 @@ def lens_rand(rng: np.random.Generator, config: LensConfig, camera: Camera) -> C
         camera = replace(camera, vignetting=(a1, a2, a3))
     if fringed:
         camera = replace(camera, chromatic_aberration=(float(fringe[0]), float(fringe[1])))
-    return replace(camera, softness_px=softness_px) if soft else camera
+    if soft:
+        camera = replace(camera, softness_px=softness_px)
+    return replace(camera, sharpening=sharpening) if sharpened else camera
 
 
 def corner_radius(camera: Camera) -> float:

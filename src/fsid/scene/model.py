@@ -159,6 +159,7 @@ class Camera:
     vignetting: a1, a2, a3 of gain = 1 + a1 r^2 + a2 r^4 + a3 r^6, r = 1 in the corner of the image.
     chromatic_aberration: magnification of red and of blue relative to green, minus 1.
     softness_px: standard deviation of the point spread (Gaussian) of lens and low-pass filter; 0 = none.
+    sharpening: how much of the detail finer than a pixel or so is added once more; 0 = none.
     """
 
     position_m: Vec3
@@ -179,6 +180,7 @@ class Camera:
     vignetting: Vec3 = ZERO
     chromatic_aberration: tuple[float, float] = (0.0, 0.0)
     softness_px: float = 0.0
+    sharpening: float = 0.0
 
 
 @dataclass(frozen=True)
