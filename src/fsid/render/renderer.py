@@ -36,7 +36,7 @@ from fsid.render.quality import QUALITIES, tap_table
 from fsid.render.sample_pass import SamplePass
 from fsid.render.shade_pass import ShadePass
 from fsid.render.shadow_pass import ShadowPass
-from fsid.render.sharpness import as_sharp_as
+from fsid.render.sharpness import set_sharpness
 from fsid.render.stage import Stage, stage_of
 from fsid.render.targets import Targets
 from fsid.render.texels import Bake, bake_texels
@@ -194,7 +194,8 @@ class Renderer:
                 self._draw(view, part, bake, mark)
                 radiance += _through_lens(part, camera, *self._targets.read_radiance())
             radiance /= np.float32(len(shots))
-        return replace(frame, radiance=as_sharp_as(camera, radiance))
+        set_sharpness(radiance, camera)
+        return replace(frame, radiance=radiance)
 
     def wait(self) -> None:
         """Return when everything issued so far is done; only measuring needs it."""

@@ -23,20 +23,24 @@ _MOST = 0.5
 """Of its own light a pixel gains or loses so much at most, so that lamps have no black rings."""
 
 
-def as_sharp_as(camera: Camera, radiance: np.ndarray) -> np.ndarray:
-    """`radiance` (H, W, 3) as soft and as sharpened as the camera's pictures are."""
-    return sharpen(soften(radiance, camera.softness_px), camera.sharpening)
+def set_sharpness(radiance: np.ndarray, camera: Camera) -> None:
+    """Make `radiance` (H, W, 3) as soft and as sharpened as the camera's pictures are: in place, colour by
+    colour, since a frame needs the most memory about here."""
+    if camera.softness_px == camera.sharpening == 0:
+        return
+    for colour in range(radiance.shape[2]):
+        radiance[..., colour] = sharpen(soften(radiance[..., colour], camera.softness_px), camera.sharpening)
 
 
 def soften(radiance: np.ndarray, softness_px: float) -> np.ndarray:
-    """`radiance` (H, W, 3) through a Gaussian of standard deviation `softness_px` pixels; 0 leaves it."""
+    """`radiance` (H, W, ...) through a Gaussian of standard deviation `softness_px` pixels; 0 leaves it."""
     for axis in (0, 1) if softness_px > 0 else ():
         radiance = gaussian_filter1d(radiance, softness_px, axis=axis, mode="nearest", truncate=_TRUNCATE)
     return radiance
 
 
 def sharpen(radiance: np.ndarray, amount: float) -> np.ndarray:
-    """`radiance` (H, W, 3), 0 or more, by unsharp masking; amount 0 leaves it."""
+    """`radiance` (H, W, ...), 0 or more, by unsharp masking; amount 0 leaves it."""
     if amount == 0:
         return radiance
     detail = radiance - soften(radiance, _SHARPENED_PX)

@@ -25,7 +25,7 @@ from fsid.render.reference.bodies import Body, body_of, bsdf_of, pyramids
 from fsid.render.reference.dicing import View
 from fsid.render.reference.lights import emitters, surroundings
 from fsid.render.reference.variant import load_mitsuba
-from fsid.render.sharpness import as_sharp_as
+from fsid.render.sharpness import set_sharpness
 from fsid.scene.model import Camera, Scene
 
 _PASS = 16
@@ -85,7 +85,8 @@ class ReferenceRenderer:
                 prepared = self.prepare(scene, _later(camera, offset))
             total += prepared.radiance(-(-self._samples // steps), seed * steps + k)
         radiance = (total / steps * _vignette(camera)[..., None]).astype(np.float32)
-        return replace(labels, radiance=as_sharp_as(camera, radiance))
+        set_sharpness(radiance, camera)
+        return replace(labels, radiance=radiance)
 
     def radiance(self, scene: Scene, camera_index: int = 0) -> np.ndarray:
         """(H, W, 3), the `radiance` of `render` alone."""
