@@ -69,6 +69,8 @@ def main() -> None:
             for top in range(0, planes.shape[1] - PATCH + 1, PATCH):
                 for left in range(0, planes.shape[2] - PATCH + 1, PATCH):
                     found.append(octaves(planes[:, top : top + PATCH, left : left + PATCH]))
+        if not found:
+            raise SystemExit(f"{folder}: no picture has {2 * PATCH} x {2 * PATCH} pixels")
         luma, colour = np.median(found, axis=0)
         table.add_row(folder.name, str(len(found)), "luma", *(f"{value:.4f}" for value in luma))
         table.add_row("", "", "green-magenta", *(f"{value:.3f}" for value in colour))
