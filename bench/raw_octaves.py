@@ -22,6 +22,7 @@ from rich.console import Console
 from rich.table import Table
 
 from fsid.dataset.index import StoredMosaic, index_mosaics
+from fsid.errors import FsidError
 from fsid.sensor.mosaic import pack
 
 EDGES = (1 / 64, 1 / 32, 1 / 16, 1 / 8, 1 / 4)
@@ -60,6 +61,8 @@ def main() -> None:
     parser.add_argument("data", type=Path, nargs="+", help="folders of pairs")
     parser.add_argument("--step", type=int, default=1, help="take every so many-th picture")
     given = parser.parse_args()
+    if given.step < 1:
+        parser.error(f"--step {given.step}: must be 1 or more")
     titles = [f"1/{round(1 / low)}" for low in EDGES]
     table = Table("data", "patches", "", *titles, title="octaves from, cycles per packed pixel")
     for folder in given.data:
@@ -78,4 +81,7 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except FsidError as error:
+        raise SystemExit(str(error)) from None
