@@ -5,7 +5,7 @@ edge-preserving filter removes) times a factor drawn from the range; `--saturati
 factor; `--soft`: a Gaussian of a standard deviation drawn from the range, pixels. Each is done to a share
 of the pictures, drawn per picture and seeded. Then `fsid generate NEW --images OUT` makes pairs of them:
 two networks trained on sets that differ in this one thing say whether the generator should be changed,
-before any scene is rendered (docs/results.md).
+before any scene is rendered (docs/rounds.md).
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ For every model the squared error after develop, by octave of spatial frequency,
 (Rec. 601), in dB relative to the first model (above 0: smaller error), median over the pictures of the
 test set; and the share of each octave in the error of the first. A network that loses in fine chroma
 keeps noise there or blurs colour; one that loses at low frequencies keeps blotches. This is how
-docs/results.md found what scenes lacked.
+docs/rounds.md found what scenes lacked.
 """
 
 from __future__ import annotations

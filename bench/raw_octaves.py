@@ -9,7 +9,7 @@ cycles per packed pixel, medians over patches of 128 x 128 packed pixels:
 
 R and B lie on either side of the two greens, so what is left in the last octave is colour, or detail finer
 than a packed pixel. A network keeps noise there if its training data has more of it than photographs have
-(docs/results.md).
+(docs/rounds.md).
 """
 
 from __future__ import annotations

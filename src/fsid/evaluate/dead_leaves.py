@@ -99,7 +99,7 @@ def _put(
 def _palette_rand(rng: np.random.Generator, size: int = 256) -> np.ndarray:
     """(size, 3) sRGB-encoded colours of one picture: correlated channels around two hues.
 
-    Contrast and lightness come out close to those of photographs (docs/results.md): a rival is worth nothing
+    Contrast and lightness come out close to those of photographs (docs/rounds.md): a rival is worth nothing
     where it was not given a fair chance.
     """
     hues = rng.normal(0, 0.25, (2, 3))

@@ -6,7 +6,7 @@
 
 A box over the pixel damps detail of three to eight pixels and lets finer detail through, which aliases:
 colours that are sampled side by side then differ where there is no colour. Pictures that have been reduced in
-size and sharpened, as published photographs have, are the other way round. docs/results.md has what a
+size and sharpened, as published photographs have, are the other way round. docs/rounds.md has what a
 denoiser makes of either.
 """
 

@@ -120,7 +120,7 @@ def _colours_rand(rng: np.random.Generator, config: SceneConfig, mood: Mood) -> 
     contrast = float(rng.uniform(*knobs.contrast))
     base = lab_rand(rng, palette, mood)
     related = base + contrast * (related_rand(rng, base) - base)
-    chroma = 0.7 * rng.random() ** 3  # texture is light and dark far more than colour (docs/results.md)
+    chroma = 0.7 * rng.random() ** 3  # texture is light and dark far more than colour (docs/rounds.md)
     apart = (_contrasting_rand(rng, base, palette, mood) - base) * (1.0, chroma, chroma)
     other = base + contrast * apart
     a, b, c = albedo_rgb(np.stack([base, related, other]), *knobs.albedo)

@@ -8,7 +8,7 @@ it by a share w, uniform over 0.1 to 0.8. So a red floor fills few photographs w
 A camera meters the scene to a mid-grey and backs off for highlights, and neither exactly. So `key` is
 log-uniform over 0.07 to 0.36 (an 18 % card, from a stop over to one and a third under) and the share of
 pixels that may reach saturation is log-uniform over 0.005 % to 25 %: a white sky or snow burns out in one
-photograph in twenty, and a denoiser that never saw it loses most there (docs/results.md). In 3 % of frames
+photograph in twenty, and a denoiser that never saw it loses most there (docs/rounds.md). In 3 % of frames
 o is 2 to 6 instead of 1, log-uniform: overexposed, so that red and blue saturate too, as they do in the skies
 of photographs; where a network has never seen that, it darkens them.
 Low light needs no darker image: the camera answers it with ISO, and ISO sets the noise.
