@@ -284,9 +284,9 @@ def test_the_driver_is_named(renderer: Renderer) -> None:
     assert info.version[0] == "4"
 
 
-@pytest.mark.parametrize(("materials", "size"), [(1, 1024), (30, 1024), (31, 512), (120, 512), (121, 256)])
+@pytest.mark.parametrize(("materials", "size"), [(1, 1024), (21, 1024), (22, 512), (84, 512), (85, 256)])
 def test_many_materials_have_smaller_tiles(materials: int, size: int) -> None:
-    """320 MiB hold 30 layers of 1024 texels, 120 of 512."""
+    """224 MiB hold 21 layers of 1024 texels, 84 of 512."""
     assert fitting_size(1024, materials) == size
 
 

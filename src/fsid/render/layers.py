@@ -12,12 +12,12 @@ import numpy as np
 from fsid.render.texels import Bake, Texels
 from fsid.render.texture_array import TextureArray
 
-BUDGET_BYTES = 320 * 2**20
-"""Texture memory: 30 layers of 1024 texels, four times as many of 512."""
+BUDGET_BYTES = 224 * 2**20
+"""Texture memory: 21 layers of 1024 texels, four times as many of 512."""
 
 MOST_LAYERS = 480
-"""Resident at most, however small they are: as many as the budget holds of 256 texels, those of five crowded
-scenes. 95 % of what later scenes need is among them; of four times as many it was 97 % (docs/results.md)."""
+"""Resident at most, however small they are: those of five crowded scenes. 95 % of what later scenes need is
+among them; of four times as many it was 97 % (docs/results.md)."""
 
 _SMALLEST = 64
 
