@@ -54,7 +54,9 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", choices=tuple(ALTERATIONS), default=tuple(ALTERATIONS))
     parser.add_argument("--step", type=int, default=1, help="every STEP-th photograph")
     given = parser.parse_args()
-    files = sorted(f for f in given.photos.iterdir() if f.suffix.lower() in EXTENSIONS)[:: given.step]
+    if given.out.exists():
+        parser.error(f"{given.out}: exists")
+    files = sorted(f for f in given.photos.glob("*") if f.suffix.lower() in EXTENSIONS)[:: given.step]
     if not files:
         parser.error(f"{given.photos}: no photographs in it")
     for name in given.only:
