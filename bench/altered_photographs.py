@@ -2,10 +2,11 @@
 
 Writes a folder of photographs once per alteration, each in a folder of its own. Make test sets of them (`fsid
 testset photos OUT/grey OUT/swapped ... -o TEST --iso 3200`) and evaluate both networks on them: where a gap
-between the two closes, it came from what the alteration takes away (docs/rounds.md).
+between the two closes, it may have come from what the alteration takes away. An altered photograph is also
+stranger to a network that was trained on photographs, so this hints, it does not prove (docs/rounds.md).
 
     as-is      nothing is altered             grey      luma alone (Rec. 601)
-    swapped    blue, red, green for red,      negative  255 - x
+    swapped    blue, red, green for red,      negative  1 - x
                green, blue: other hues        doubled   twice the size, cubic spline: nothing finer than 2 px
     plain      median of 5x5: no texture      soft      Gaussian, 0.7 px
     sharpened  unsharp mask, 0.8 px, amount 1 muted     half the contrast about mid grey
@@ -21,10 +22,12 @@ import numpy as np
 from PIL import Image
 from scipy.ndimage import gaussian_filter, median_filter, zoom
 
+from fsid.dataset.photos import find_photos, read_photo
+from fsid.errors import FsidError
+
 Alteration = Callable[[np.ndarray], np.ndarray]
 
 LUMA = np.array([0.299, 0.587, 0.114])
-EXTENSIONS = (".png", ".jpg", ".jpeg", ".tif", ".tiff")
 
 
 def _soft(picture: np.ndarray, sigma_px: float) -> np.ndarray:
@@ -35,14 +38,14 @@ ALTERATIONS: dict[str, Alteration] = {
     "as-is": lambda x: x,
     "grey": lambda x: np.repeat((x @ LUMA)[..., None], 3, axis=2),
     "swapped": lambda x: x[..., [2, 0, 1]],
-    "negative": lambda x: 255 - x,
+    "negative": lambda x: 1 - x,
     "doubled": lambda x: zoom(x, (2, 2, 1), order=3),
     "plain": lambda x: median_filter(x, (5, 5, 1)),
     "soft": lambda x: _soft(x, 0.7),
     "sharpened": lambda x: 2 * x - _soft(x, 0.8),
-    "muted": lambda x: 128 + 0.5 * (x - 128),
+    "muted": lambda x: 0.25 + 0.5 * x,
 }
-"""Name -> what it makes of a picture (H, W, 3), sRGB-encoded, 0..255."""
+"""Name -> what it makes of a picture (H, W, 3), sRGB-encoded, 0..1."""
 
 
 def main() -> None:
@@ -56,17 +59,15 @@ def main() -> None:
     given = parser.parse_args()
     if given.out.exists():
         parser.error(f"{given.out}: exists")
-    files = sorted(f for f in given.photos.glob("*") if f.suffix.lower() in EXTENSIONS)[:: given.step]
-    if not files:
-        parser.error(f"{given.photos}: no photographs in it")
+    try:
+        photos = {file.stem: read_photo(file) for file in find_photos(given.photos)[:: given.step]}
+    except FsidError as problem:
+        parser.error(str(problem))
     for name in given.only:
         (given.out / name).mkdir(parents=True)
-        for file in files:
-            with Image.open(file) as image:
-                picture = np.asarray(image.convert("RGB"), np.float64)
-            altered = np.clip(np.rint(ALTERATIONS[name](picture)), 0, 255).astype(np.uint8)
-            height, width = (size // 2 * 2 for size in altered.shape[:2])
-            Image.fromarray(altered[:height, :width]).save(given.out / name / f"{file.stem}.png")
+        for stem, photo in photos.items():
+            altered = np.clip(ALTERATIONS[name](photo), 0.0, 1.0)
+            Image.fromarray(np.rint(altered * 255).astype(np.uint8)).save(given.out / name / f"{stem}.png")
 
 
 if __name__ == "__main__":
