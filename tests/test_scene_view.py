@@ -109,9 +109,12 @@ def test_the_lens_changes_nothing_but_the_lens():
     assert any(seen.chromatic_aberration)
     assert 0.4 <= seen.softness_px <= 0.65
     assert 0.4 <= seen.sharpening <= 1.3
+    red, blue = seen.colour_contrast
+    assert 0.0 <= red <= 0.12
+    assert 0.02 <= blue <= 0.14
     fields = (
         *("distortion", "aperture_m", "focus_m", "vignetting"),
-        *("chromatic_aberration", "softness_px", "sharpening"),
+        *("chromatic_aberration", "softness_px", "sharpening", "colour_contrast"),
     )
     assert dataclasses.replace(seen, **{name: getattr(plain, name) for name in fields}) == plain
 

@@ -30,6 +30,7 @@ _WIDEST_TANGENT = 6.0
 _MOST_PIXELS = 3.0
 _MAX_SOFTNESS_PX = 50.0
 _MAX_SHARPENING = 5.0
+_MAX_COLOUR_CONTRAST = 0.5
 
 
 @dataclass(frozen=True)
@@ -66,6 +67,11 @@ def lens_of(camera: Camera, time_s: float | None = None) -> Lens:
         raise FsidError(f"scene.cameras: softness_px {camera.softness_px}: must be 0 .. {_MAX_SOFTNESS_PX:g}")
     if not 0 <= camera.sharpening <= _MAX_SHARPENING:
         raise FsidError(f"scene.cameras: sharpening {camera.sharpening}: must be 0 .. {_MAX_SHARPENING:g}")
+    if not all(abs(extra) <= _MAX_COLOUR_CONTRAST for extra in camera.colour_contrast):
+        raise FsidError(
+            f"scene.cameras: colour_contrast {camera.colour_contrast}: "
+            f"must be -{_MAX_COLOUR_CONTRAST:g} .. {_MAX_COLOUR_CONTRAST:g}"
+        )
     forward /= np.linalg.norm(forward)
     right /= np.linalg.norm(right)
     rotation = np.stack([right, np.cross(right, forward), forward])

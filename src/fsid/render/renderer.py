@@ -22,6 +22,7 @@ import numpy as np
 from fsid.errors import FsidError
 from fsid.render.buffers import Buffers
 from fsid.render.camera import lens_of
+from fsid.render.colour_contrast import set_colour_contrast
 from fsid.render.context import GlInfo, gl_info, open_context, return_free_blocks, return_large_blocks
 from fsid.render.defocus import defocus
 from fsid.render.drain import Drain
@@ -195,6 +196,7 @@ class Renderer:
                 radiance += _through_lens(part, camera, *self._targets.read_radiance())
             radiance /= np.float32(len(shots))
         set_sharpness(radiance, camera)
+        set_colour_contrast(radiance, camera)
         return replace(frame, radiance=radiance)
 
     def wait(self) -> None:

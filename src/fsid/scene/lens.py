@@ -48,6 +48,8 @@ def lens_rand(rng: np.random.Generator, config: LensConfig, camera: Camera) -> C
     fringe = rng.uniform(*config.fringe, 2)
     softness_px = float(rng.uniform(*config.softness_px))
     sharpened, sharpening = rng.random() < config.sharp_share, float(rng.uniform(*config.sharpening))
+    contrast = float(rng.uniform(*config.contrast_red)), float(rng.uniform(*config.contrast_blue))
+    camera = replace(camera, colour_contrast=contrast)
     if fisheye:
         camera = _fisheye(camera, bend)
     elif distorted:

@@ -19,6 +19,7 @@ import numpy as np
 from fsid.assets import bake_material
 from fsid.errors import FsidError
 from fsid.render.camera import Lens, lens_of
+from fsid.render.colour_contrast import set_colour_contrast
 from fsid.render.frame import Frame
 from fsid.render.parts import parts_of, turn
 from fsid.render.reference.bodies import Body, body_of, bsdf_of, pyramids
@@ -86,6 +87,7 @@ class ReferenceRenderer:
             total += prepared.radiance(-(-self._samples // steps), seed * steps + k)
         radiance = (total / steps * _vignette(camera)[..., None]).astype(np.float32)
         set_sharpness(radiance, camera)
+        set_colour_contrast(radiance, camera)
         return replace(labels, radiance=radiance)
 
     def radiance(self, scene: Scene, camera_index: int = 0) -> np.ndarray:
