@@ -1,4 +1,4 @@
-"""Contrast of red and blue relative to green: a slope in logarithms about the median of the frame."""
+"""Contrast of red and blue relative to green: a slope on luminance about the median of the frame."""
 
 from dataclasses import replace
 
@@ -9,6 +9,7 @@ from fsid.errors import FsidError
 from fsid.render.camera import lens_of
 from fsid.render.colour_contrast import set_colour_contrast
 from fsid.scene.model import Camera
+from fsid.sensor.colour import SRGB_TO_XYZ
 
 CAMERA = Camera((0, 1, 1), (0, 0, 0), (0, 1, 0), 60.0, 64, 64)
 
@@ -19,13 +20,14 @@ def seen(image, red, blue):
     return image
 
 
-def test_red_and_blue_have_the_stated_slope_and_green_its_own():
-    image = np.exp(np.random.default_rng(0).normal(0, 1, (64, 64, 3))).astype(np.float32)
+def test_colours_have_the_stated_slope_on_luminance():
+    grey = np.exp(np.random.default_rng(0).normal(0, 1, (64, 64))).astype(np.float32)
+    image = np.stack([0.5 * grey, grey, 0.3 * grey], axis=2)
     after = seen(image, 0.1, -0.05)
     assert after.dtype == np.float32
     for colour, slope in enumerate((1.1, 1.0, 0.95)):
-        before, now = np.log(image[..., colour]).ravel(), np.log(after[..., colour]).ravel()
-        assert np.polyfit(before, now, 1)[0] == pytest.approx(slope, abs=1e-4)
+        now = np.log(after[..., colour]).ravel()
+        assert np.polyfit(np.log(grey).ravel(), now, 1)[0] == pytest.approx(slope, abs=1e-4)
 
 
 def test_the_middle_keeps_its_colour_and_dark_grey_turns_green():
@@ -33,9 +35,21 @@ def test_the_middle_keeps_its_colour_and_dark_grey_turns_green():
     image = np.repeat(np.repeat(np.array(rows, np.float32)[:, None, None], 8, axis=1), 3, axis=2)
     after = seen(image, 0.1, 0.1)
     np.testing.assert_allclose(after[0], image[0], rtol=1e-6)
-    np.testing.assert_allclose(after[9, :, [0, 2]] / 0.02, 0.1**0.1, rtol=1e-5)
-    np.testing.assert_allclose(after[10, :, [0, 2]] / 2.0, 10**0.1, rtol=1e-5)
+    np.testing.assert_allclose(after[9][:, [0, 2]] / 0.02, 0.1**0.1, rtol=1e-5)
+    np.testing.assert_allclose(after[10][:, [0, 2]] / 2.0, 10**0.1, rtol=1e-5)
     np.testing.assert_array_equal(after[..., 1], image[..., 1])
+
+
+def test_hues_of_one_brightness_stay_as_they_are():
+    image = np.random.default_rng(2).uniform(0.1, 1, (16, 16, 3))
+    image = (image / (image @ SRGB_TO_XYZ[1])[..., None]).astype(np.float32)
+    np.testing.assert_allclose(seen(image, 0.3, -0.2), image, rtol=1e-5)
+
+
+def test_a_lamp_gains_a_bounded_factor():
+    image = np.full((16, 16, 3), 0.1, np.float32)
+    image[3, 3] = 1e6
+    assert seen(image, 0.1, 0.1)[3, 3, 0] == pytest.approx(1e6 * 100**0.1, rel=1e-4)
 
 
 def test_no_contrast_changes_nothing():

@@ -1,9 +1,9 @@
-"""Red and blue of more, or less, contrast than green, as film and the rendering of most pictures have them.
+"""Light parts more magenta than dark ones, as in photographs: red and blue of more contrast than green.
 
-    R' = R (R / median R)^red,      B' = B (B / median B)^blue
+    R' = R (Y / median Y)^red,      B' = B (Y / median Y)^blue,      Y the luminance
 
-An exponent of 0 leaves a colour as it is; above 0 dark parts turn greener and light ones more magenta
-("crossover" of colour film). docs/rounds.md has by how much photographs do, and what a denoiser makes of it.
+An exponent of 0 leaves a colour as it is; below 0 light parts turn greener. docs/rounds.md has how it is in
+photographs, and what a denoiser makes of it.
 """
 
 from __future__ import annotations
@@ -11,19 +11,24 @@ from __future__ import annotations
 import numpy as np
 
 from fsid.scene.model import Camera
+from fsid.sensor.colour import SRGB_TO_XYZ
 
+_LUMINANCE = SRGB_TO_XYZ[1].astype(np.float32)
 _STRIDE = 4
-_DARKEST = np.float32(1e-4)
-"""Relative to the median: darker parts take the factor of this, so that black stays finite."""
+_RANGE = (np.float32(1e-3), np.float32(1e2))
+"""Of luminance relative to its median; what is darker or lighter takes the factor of these."""
 
 
 def set_colour_contrast(radiance: np.ndarray, camera: Camera) -> None:
-    """Give red and blue of `radiance` (H, W, 3), linear RGB >= 0, the camera's contrast: in place.
+    """Give red and blue of `radiance` (H, W, 3), linear sRGB >= 0, the camera's contrast: in place.
 
-    The median is taken over every fourth pixel both ways. A colour whose median is 0 is left alone.
+    The median is taken over every fourth pixel both ways. A frame whose median is 0 is left alone.
     """
-    for colour, extra in zip((0, 2), camera.colour_contrast, strict=True):
-        light = radiance[..., colour]
-        middle = np.median(light[::_STRIDE, ::_STRIDE])
-        if extra and middle > 0:
-            light *= np.maximum(light / middle, _DARKEST) ** np.float32(extra)
+    if not any(camera.colour_contrast):
+        return
+    luminance = radiance @ _LUMINANCE
+    middle = np.median(luminance[::_STRIDE, ::_STRIDE])
+    if middle > 0:
+        relative = np.clip(luminance / middle, *_RANGE)
+        for colour, extra in zip((0, 2), camera.colour_contrast, strict=True):
+            radiance[..., colour] *= relative ** np.float32(extra)

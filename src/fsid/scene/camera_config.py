@@ -99,9 +99,9 @@ class LensConfig:
     """Share of pictures that are sharpened, as published photographs are."""
     sharpening: Range = knob((0.4, 1.3), 0.0, 5.0)
     """How much of the detail finer than a pixel or so is added once more."""
-    contrast_red: Range = knob((0.0, 0.12), -0.5, 0.5)
-    """Contrast of red (slope in logarithms) relative to green, minus 1."""
-    contrast_blue: Range = knob((0.02, 0.14), -0.5, 0.5)
+    contrast_red: Range = knob((0.05, 0.17), -0.5, 0.5)
+    """Contrast of red (slope in logarithms, on luminance) relative to green, minus 1."""
+    contrast_blue: Range = knob((0.04, 0.16), -0.5, 0.5)
     """Contrast of blue relative to green, minus 1."""
 
     def __post_init__(self) -> None:

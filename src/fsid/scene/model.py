@@ -160,7 +160,7 @@ class Camera:
     chromatic_aberration: magnification of red and of blue relative to green, minus 1.
     softness_px: standard deviation of the point spread (Gaussian) of lens and low-pass filter; 0 = none.
     sharpening: how much of the detail finer than a pixel or so is added once more; 0 = none.
-    colour_contrast: contrast of red and of blue (slope in logarithms) relative to green, minus 1.
+    colour_contrast: contrast of red and of blue relative to green, minus 1: slopes on luminance, logarithms.
     """
 
     position_m: Vec3
