@@ -8,8 +8,8 @@ import pytest
 from fsid.errors import FsidError
 from fsid.render.camera import lens_of
 from fsid.render.colour_contrast import set_colour_contrast
+from fsid.scene.colour import LUMINANCE
 from fsid.scene.model import Camera
-from fsid.sensor.colour import SRGB_TO_XYZ
 
 CAMERA = Camera((0, 1, 1), (0, 0, 0), (0, 1, 0), 60.0, 64, 64)
 
@@ -42,7 +42,7 @@ def test_the_middle_keeps_its_colour_and_dark_grey_turns_green():
 
 def test_hues_of_one_brightness_stay_as_they_are():
     image = np.random.default_rng(2).uniform(0.1, 1, (16, 16, 3))
-    image = (image / (image @ SRGB_TO_XYZ[1])[..., None]).astype(np.float32)
+    image = (image / (image @ LUMINANCE)[..., None]).astype(np.float32)
     np.testing.assert_allclose(seen(image, 0.3, -0.2), image, rtol=1e-5)
 
 

@@ -10,10 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from fsid.scene.colour import LUMINANCE
 from fsid.scene.model import Camera
-from fsid.sensor.colour import SRGB_TO_XYZ
 
-_LUMINANCE = SRGB_TO_XYZ[1].astype(np.float32)
 _STRIDE = 4
 _RANGE = (np.float32(1e-3), np.float32(1e2))
 """Of luminance relative to its median; what is darker or lighter takes the factor of these."""
@@ -26,7 +25,7 @@ def set_colour_contrast(radiance: np.ndarray, camera: Camera) -> None:
     """
     if not any(camera.colour_contrast):
         return
-    luminance = radiance @ _LUMINANCE
+    luminance = radiance @ LUMINANCE.astype(np.float32)
     middle = np.median(luminance[::_STRIDE, ::_STRIDE])
     if middle > 0:
         relative = np.clip(luminance / middle, *_RANGE)

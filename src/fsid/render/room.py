@@ -20,12 +20,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from fsid.render.shadows import cone_cosines, unit
+from fsid.scene.colour import LUMINANCE
 from fsid.scene.model import Light, Vec3
 
 GRID = 16
 SKY_GRID = 64
 SKY_HALF_M = 1e5
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
 @dataclass(frozen=True)
@@ -54,9 +54,9 @@ def light_room(
     centre = np.array([0.0, 0.0, floor_m + half[2]])
     direct = np.stack([_irradiance(half, centre, side, lights) for side in range(6)])
     radiance = albedo[:, None, None] * (direct / np.pi + np.array(ambient)) + glow[:, None, None]
-    level = direct.mean((1, 2)) @ _LUMINANCE / np.pi + float(np.array(ambient) @ _LUMINANCE)
+    level = direct.mean((1, 2)) @ LUMINANCE / np.pi + float(np.array(ambient) @ LUMINANCE)
     relative = albedo * level[:, None] + glow
-    mean = float((relative @ _LUMINANCE).mean())
+    mean = float((relative @ LUMINANCE).mean())
     tint = relative / mean if mean > 0 else np.ones((6, 3))
     return Room(half, centre, tint * np.array(ambient) + glow, radiance)
 

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from fsid.errors import FsidError
+from fsid.scene.colour import LUMINANCE
 from fsid.scene.model import Sky
 
 HEIGHT = 512
@@ -34,7 +35,7 @@ def panorama(sky: Sky) -> np.ndarray:
     weight = np.cos(elevation) * (elevation > 0)
     mean = (picture * weight[:, None, None]).sum((0, 1)) / (weight.sum() * picture.shape[1])
     if sky.source != "procedural":
-        mean = np.full(3, max(float(mean @ (0.2126, 0.7152, 0.0722)), 1e-12))
+        mean = np.full(3, max(float(mean @ LUMINANCE), 1e-12))
     turned = np.roll(picture, round(sky.azimuth_deg / 360 * picture.shape[1]), axis=1)
     return (turned * (np.array(sky.colour) / np.maximum(mean, 1e-12))).astype(np.float32)
 
