@@ -102,7 +102,7 @@ class LensConfig:
     contrast_red: Range = knob((0.05, 0.17), -0.5, 0.5)
     """Contrast of red (slope in logarithms, on luminance) relative to green, minus 1."""
     contrast_blue: Range = knob((0.04, 0.16), -0.5, 0.5)
-    """Contrast of blue relative to green, minus 1."""
+    """The same of blue."""
 
     def __post_init__(self) -> None:
         check_knobs(self)
