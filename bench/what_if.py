@@ -185,12 +185,14 @@ def main() -> None:
     )
     parser.add_argument("run", type=Path)
     parser.add_argument("scenes", type=Path)
-    parser.add_argument("--photos", type=Path, required=True)
-    parser.add_argument("--test", type=Path, nargs="+", required=True)
-    parser.add_argument("--other", type=Path, nargs="*", default=[])
-    parser.add_argument("--steps", type=int, default=150)
-    parser.add_argument("--learning-rate", type=float, default=2e-4)
-    parser.add_argument("--altered", action=argparse.BooleanOptionalAction, default=True)
+    parser.add_argument("--photos", type=Path, required=True, help="what there is to gain")
+    parser.add_argument("--test", type=Path, nargs="+", required=True, help="what is measured on")
+    parser.add_argument("--other", type=Path, nargs="*", default=[], help="datasets to train on instead")
+    parser.add_argument("--steps", type=int, default=150, help="of training (default 150)")
+    parser.add_argument("--learning-rate", type=float, default=2e-4, help="constant (default 2e-4)")
+    parser.add_argument(
+        "--altered", action=argparse.BooleanOptionalAction, default=True, help="try the alterations (default)"
+    )
     given = parser.parse_args()
     console = Console()
     try:
