@@ -73,6 +73,7 @@ def _times_luma(x: np.ndarray, gain: float, fine_px: float, coarse_px: float) ->
 
 
 def _coupled(x: np.ndarray, red: float, blue: float) -> np.ndarray:
+    """Red and blue of 1 + `red` and 1 + `blue` times the contrast of luma, about the mean of the patch."""
     slopes = np.array([red, 0, 0, blue])[:, None, None]
     return _values(_logs(x) + slopes * _from_mean(_luma(x)))
 
@@ -134,8 +135,6 @@ class Continued:
         self._net.load_state_dict(self._start)
         optimizer = self._optimizer()
         optimizer.load_state_dict(copy.deepcopy(self._moments))
-        for group in optimizer.param_groups:
-            group["lr"] = self._rate
         mean, kept = {name: torch.zeros_like(w) for name, w in self._start.items()}, 0
         for step, batch in enumerate(self._batches(data, _BATCH, self._steps, seed=5)):
             clean, noisy = batch.clean, batch.noisy
@@ -162,7 +161,10 @@ class Continued:
         return np.asarray(-10 * torch.log10(error.square().mean((1, 2, 3))))
 
     def _optimizer(self) -> torch.optim.Optimizer:
-        return torch.optim.AdamW(self._net.parameters(), betas=self.config.betas, weight_decay=0.0)
+        c = self.config
+        return torch.optim.AdamW(
+            self._net.parameters(), lr=self._rate, betas=c.betas, weight_decay=c.weight_decay
+        )
 
     def _batches(self, data: Path, size: int, count: int, seed: int) -> Iterator[Batch]:
         c = self.config
