@@ -2,12 +2,12 @@
 
     python bench/what_if.py run scenes --photos bsds --test cbsd68 mcmaster [--other changed-scenes ...]
 
-RUN is a training that has ended (`fsid train`), everything else a dataset (`fsid generate scenes`, `fsid
-generate photographs`). The run goes on for 150 steps of 8 patches: on SCENES as they are, which is what all
-else is compared with, on photographs (how much there is to gain), on SCENES altered in one way each, and on
-other datasets. Places, levels and draws of noise are the same every time, and so are those of the patches
-that the resulting networks are tested on, so thousandths of a decibel show in a minute. --cut 16 trains on
-pieces of 16 packed pixels: what is still gained then is local.
+RUN is a training that has ended (`fsid train`), everything else a dataset (`fsid generate`, of scenes or,
+with --images, of photographs). The run goes on for 150 steps of 8 patches: on SCENES as they are, which is
+what all else is compared with, on photographs (how much there is to gain), on SCENES altered in one way each,
+and on other datasets. Places, levels and draws of noise are the same every time, and so are those of the
+patches that the resulting networks are tested on, so thousandths of a decibel show in a minute. --cut 16
+trains on pieces of 16 packed pixels: what is still gained then is local.
 
 Unlike the gradient's first order this sees what a change costs as well, but still only where a training of
 that length would go. Train to know (docs/rounds.md).
