@@ -32,6 +32,7 @@ from fsid.denoise.stabilise import stabilise, unstabilise  # noqa: E402
 from fsid.denoise.train import learning_rate, noise_left  # noqa: E402
 from fsid.denoise.validate import held_out, validation  # noqa: E402
 from fsid.errors import FsidError  # noqa: E402
+from fsid.files import held  # noqa: E402
 from fsid.sensor import Raw, add_noise, clean_levels, load_profile, write_dng  # noqa: E402
 
 CONFIG = TrainConfig(
@@ -202,6 +203,18 @@ def test_progress_replaces_the_live_line_and_quiet_is_silent(
     assert capfd.readouterr() == ("", "")
     train(data, tmp_path / "c", CONFIG)
     assert "PSNR" in "".join(capfd.readouterr())
+
+
+def test_a_folder_is_one_training_s_at_a_time(data: Path, tmp_path: Path) -> None:
+    run, one = tmp_path / "run", replace(CONFIG, steps=1)
+    with (
+        held(run, "another test is at work in it"),
+        pytest.raises(FsidError, match=r"run: another fsid train is at work in it; wait for it or stop it"),
+    ):
+        train(data, run, one, quiet=True)
+    assert not (run / "checkpoint.safetensors").exists()
+    train(data, run, one, quiet=True)
+    assert (run / "checkpoint.safetensors").exists()
 
 
 def test_learning_rate_rises_and_falls() -> None:

@@ -7,8 +7,6 @@ goes on where it stopped, and one that is running keeps others out of its folder
 
 from __future__ import annotations
 
-import fcntl
-import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -24,6 +22,7 @@ from fsid.dataset.settle import Settle, settle
 from fsid.dataset.shards import remove_parts, shard_keys, shard_path, write_shard
 from fsid.dataset.worker import Worker
 from fsid.errors import FsidError
+from fsid.files import held
 from fsid.sensor import load_profile
 
 SHARD_SIZE = 16
@@ -147,24 +146,13 @@ def dataset_config(config: GenerateConfig, seed: int, shard_size: int = 0) -> Da
 
 @contextmanager
 def _locked(out: Path) -> Iterator[None]:
-    """`out` exists and is this process's until the end of the block, or until it dies."""
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        folder = os.open(out, os.O_RDONLY | os.O_DIRECTORY)
-    except OSError as error:
-        raise FsidError(f"{out}: cannot be written ({error.strerror})") from None
-    try:
+    """`out` is this process's, and free of what an interrupted one left."""
+    with held(out, "another fsid generate is filling it"):
+        remove_parts(out)
         try:
-            fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise FsidError(f"{out}: another fsid generate is filling it; wait for it or stop it") from None
-        except OSError:
-            pass  # a network file system without locks
-        remove_parts(out)
-        yield
-    finally:
-        remove_parts(out)
-        os.close(folder)
+            yield
+        finally:
+            remove_parts(out)
 
 
 def _withdraw_card(out: Path) -> None:

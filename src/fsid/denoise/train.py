@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import asdict
 from pathlib import Path
 
@@ -37,7 +38,7 @@ from fsid.denoise.stabilise import stabilise
 from fsid.denoise.train_config import TrainConfig
 from fsid.denoise.validate import held_out, validation
 from fsid.errors import FsidError
-from fsid.files import write_atomically
+from fsid.files import held, write_atomically
 
 CONFIG_FILE = "config.yaml"
 HISTORY_FILE, VALIDATION_FILE = "history.json", "validation.json"
@@ -61,7 +62,7 @@ def train(
     config. resume: insist that there is one. command: for the record of the run. progress(done, steps) is
     called in place of the live line. Under `torchrun` or `accelerate launch` each process draws batches of
     its own and gradients are averaged. Raises FsidError for unusable data or settings, another run in
-    `run_dir`, or a training that diverges.
+    `run_dir`, another process at work there, or a training that diverges.
     """
     if config.threads:
         torch.set_num_threads(config.threads)
@@ -72,27 +73,28 @@ def train(
     patches = PatchDataset(data_dir, _patch_config(config, len(kept)), config.seed, accelerator.process_index)
     with accelerator.main_process_first():
         _prepare_run(run_dir, config, resume and is_main)
-    torch.manual_seed(config.seed)
-    net, optimizer = _prepare(accelerator, config)
-    bare = accelerator.unwrap_model(net)
-    state = load_checkpoint(run_dir, bare, optimizer)
-    forward = torch.compile(net) if _compiles(config) else net
-    feed = batches(patches, range(state.step, config.steps), config.loader_processes, pin=gpu)
-    shown = is_main and not quiet and progress is None
-    with LiveLine(config, state.step, accelerator.num_processes, quiet=not shown) as live:
-        keeper = _Keeper(data_dir, run_dir, config, accelerator, patches.mosaics, command, state, live)
-        for batch in feed:
-            rate = learning_rate(config, state.step)
-            loss, psnr = _step(accelerator, forward, net, optimizer, batch, rate, config)
-            state.advance(bare, config.ema_decay)
-            live.update(state.step, loss, psnr)
-            row = state.log(loss, psnr, rate, config.log_every)
+    with held(run_dir, "another fsid train is at work in it") if is_main else nullcontext():
+        torch.manual_seed(config.seed)
+        net, optimizer = _prepare(accelerator, config)
+        bare = accelerator.unwrap_model(net)
+        state = load_checkpoint(run_dir, bare, optimizer)
+        forward = torch.compile(net) if _compiles(config) else net
+        feed = batches(patches, range(state.step, config.steps), config.loader_processes, pin=gpu)
+        shown = is_main and not quiet and progress is None
+        with LiveLine(config, state.step, accelerator.num_processes, quiet=not shown) as live:
+            keeper = _Keeper(data_dir, run_dir, config, accelerator, patches.mosaics, command, state, live)
+            for batch in feed:
+                rate = learning_rate(config, state.step)
+                loss, psnr = _step(accelerator, forward, net, optimizer, batch, rate, config)
+                state.advance(bare, config.ema_decay)
+                live.update(state.step, loss, psnr)
+                row = state.log(loss, psnr, rate, config.log_every)
+                if is_main:
+                    keeper.after_step(row, bare, optimizer)
+                if progress is not None:
+                    progress(state.step, config.steps)
             if is_main:
-                keeper.after_step(row, bare, optimizer)
-            if progress is not None:
-                progress(state.step, config.steps)
-        if is_main:
-            keeper.finish(bare, optimizer)
+                keeper.finish(bare, optimizer)
     accelerator.wait_for_everyone()
     return run_dir / MODEL_FILE
 
