@@ -89,11 +89,14 @@ def merge(drawables: Sequence[Drawable], layer_of: Callable[[Material], Layer], 
         vertices.append(mesh_vertices)
         world.append(positions)
         indices.append(faces + np.uint32(first_vertex))
+        low, high = drawable.mesh.vertices.min(0), drawable.mesh.vertices.max(0)
+        thickness_m = _GLASS_SHARE * (high - low).min() * min(drawable.transform.scale)
         surfaces += [
-            _surface(drawable, material, layer_of(material), time_s) for material in drawable.materials
+            _surface(drawable, material, layer_of(material), thickness_m, time_s)
+            for material in drawable.materials
         ]
         ranges.append((first_index, len(faces)))
-        spheres.append(_sphere(drawable, time_s))
+        spheres.append(_sphere(drawable, low, high, time_s))
         first_vertex += len(mesh_vertices)
         first_index += len(faces)
         first_surface += len(drawable.materials)
@@ -152,7 +155,9 @@ def _in_world(drawable: Drawable, index: np.ndarray | None, time_s: float) -> tu
     return world, turned
 
 
-def _surface(drawable: Drawable, material: Material, layer: Layer, time_s: float) -> np.ndarray:
+def _surface(
+    drawable: Drawable, material: Material, layer: Layer, thickness_m: float, time_s: float
+) -> np.ndarray:
     surface = np.zeros((), SURFACE)
     surface["place"][:, :3], surface["place"][:, 3] = drawable.pose(time_s)
     surface["tiles_per_m"] = 1.0 / material.tile_m
@@ -172,9 +177,7 @@ def _surface(drawable: Drawable, material: Material, layer: Layer, time_s: float
     surface["transmission"] = material.transmission
     surface["object_id"] = drawable.object_id + 1
     surface["patched"] = material.patched
-    surface["thickness_m"] = (
-        _GLASS_SHARE * np.ptp(drawable.mesh.vertices, axis=0).min() * min(drawable.transform.scale)
-    )
+    surface["thickness_m"] = thickness_m
     return surface
 
 
@@ -185,8 +188,9 @@ _SMOOTHEST = 0.18
 """MIN_ROUGHNESS in shaders/material.glsl: bounds the highlights of lights without size."""
 
 
-def _sphere(drawable: Drawable, time_s: float) -> tuple[float, float, float, float]:
-    low, high = drawable.mesh.vertices.min(0), drawable.mesh.vertices.max(0)
+def _sphere(
+    drawable: Drawable, low: np.ndarray, high: np.ndarray, time_s: float
+) -> tuple[float, float, float, float]:
     scale = np.array(drawable.transform.scale)
     rotation, position = drawable.pose(time_s)
     x, y, z = (float(c) for c in rotation @ ((low + high) / 2 * scale) + position)

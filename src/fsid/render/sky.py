@@ -52,16 +52,19 @@ def _procedural(sky: Sky) -> np.ndarray:
     low = (1 - np.clip(height, 0, 1)) ** 4
     picture = _ZENITH * (1 - low) + _HORIZON * low
     picture = np.where(height < 0, _HORIZON * _GROUND, picture)
+    picture = np.repeat(picture, 2 * HEIGHT, axis=1)
     if sky.cloudiness > 0:
-        cover = _clouds(np.random.default_rng(sky.seed), elevation, azimuth, sky.cloudiness)
-        picture = picture * (1 - cover[..., None]) + 1.6 * cover[..., None]
-    return np.broadcast_to(picture, (HEIGHT, 2 * HEIGHT, 3))
+        above = picture[: HEIGHT // 2]
+        cover = _clouds(np.random.default_rng(sky.seed), elevation[: HEIGHT // 2], azimuth, sky.cloudiness)
+        above *= 1 - cover[..., None]
+        above += 1.6 * cover[..., None]
+    return picture
 
 
 def _clouds(
     rng: np.random.Generator, elevation: np.ndarray, azimuth: np.ndarray, cloudiness: float
 ) -> np.ndarray:
-    """(H, W) opacity 0..1 of a flat layer of clouds that thins out towards the horizon."""
+    """(H, W) opacity 0..1 of a flat layer of clouds that thins out towards the horizon; elevation: above 0."""
     lattice = rng.random((64, 64))
     reach = 1.0 / np.tan(np.maximum(elevation, 0.06))[:, None]
     x, y = reach * np.cos(azimuth), reach * np.sin(azimuth)
@@ -72,13 +75,16 @@ def _clouds(
 
 
 def _lattice(values: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Smooth interpolation of a periodic lattice of random numbers."""
-    size = len(values)
-    i, j = np.floor(x).astype(int), np.floor(y).astype(int)
+    """Smooth interpolation of a periodic lattice of random numbers, 2^n a side."""
+    last, flat = len(values) - 1, values.ravel()
+    i, j = np.floor(x), np.floor(y)
     u, v = x - i, y - j
     u, v = u * u * (3 - 2 * u), v * v * (3 - 2 * v)
-    a, b = values[j % size, i % size], values[j % size, (i + 1) % size]
-    c, d = values[(j + 1) % size, i % size], values[(j + 1) % size, (i + 1) % size]
+    i, j = i.astype(np.int32), j.astype(np.int32)
+    left, right = i & last, (i + 1) & last
+    upper, lower = (j & last) * len(values), ((j + 1) & last) * len(values)
+    a, b = flat[upper + left], flat[upper + right]
+    c, d = flat[lower + left], flat[lower + right]
     return np.asarray((a * (1 - u) + b * u) * (1 - v) + (c * (1 - u) + d * u) * v)
 
 
