@@ -64,7 +64,7 @@ def _procedural(sky: Sky) -> np.ndarray:
 def _clouds(
     rng: np.random.Generator, elevation: np.ndarray, azimuth: np.ndarray, cloudiness: float
 ) -> np.ndarray:
-    """(H, W) opacity 0..1 of a flat layer of clouds that thins out towards the horizon; elevation: above 0."""
+    """(H, W) opacity 0..1 of a flat layer of clouds that thins out towards the horizon; elevation > 0."""
     lattice = rng.random((64, 64))
     reach = 1.0 / np.tan(np.maximum(elevation, 0.06))[:, None]
     x, y = reach * np.cos(azimuth), reach * np.sin(azimuth)

@@ -9,19 +9,21 @@ float mirrored_at(vec2 at, float depth, float reach) {
 }
 
 // The image of smooth ground at a point of it, in direction r: blurred as the things around need, near ones above
-// all, so that their edges do not glow into what is far behind them.
-vec3 ground_image(Sample p, vec3 r, float alpha) {
+// all, so that their edges do not glow into what is far behind them. wanted: false gives nothing of use, soon.
+vec3 ground_image(Sample p, vec3 r, float alpha, bool wanted) {
     vec3 local = axes * (p.position - origin);
     float reach = length(local), width = 2.0 * alpha * 0.5 * seen_focal.x;
     vec2 at = seen_at(local / local.z) / vec2(seen);
     float beyond = mirrored_at(at, local.z, reach);
     vec2 aside = vec2(1.0, float(seen.x) / float(seen.y)) * min(width * beyond / (beyond + reach), 0.1);
     float nearness = 1.0 / max(beyond, 1e-3);
-    for (int i = 0; i < 8; ++i) {
-        float turn = float(i) * 0.25 * PI;
-        vec2 step = aside * vec2(cos(turn), sin(turn)) * (0.5 + 0.5 * float(i & 1));
+    vec2 direction = vec2(1, 0);
+    int i = wanted ? 0 : 7;
+    do {
+        vec2 step = aside * direction * (0.5 + 0.5 * float(i & 1));
         nearness += 1.0 / max(mirrored_at(at + step, local.z, reach), 1e-3);
-    }
+        direction = sqrt(0.5) * vec2(direction.x - direction.y, direction.x + direction.y);
+    } while (++i < 8);
     float nearest = 9.0 / nearness;
     vec3 there = axes * ((p.position + r * beyond) * vec3(1, 1, -1) - origin);
     vec2 moved = clamp(seen_at(there / max(there.z, 1e-3)) / vec2(seen), 0.0, 1.0);

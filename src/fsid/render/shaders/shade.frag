@@ -80,7 +80,7 @@ vec3 surroundings_in(Sample p, vec3 r, float alpha) {
 #if PLANAR
     bool ground = abs(p.position.z) < 0.002 && p.face_normal.z > 0.999;
     float share = ground ? 1.0 - smoothstep(0.12, 0.25, alpha) : 0.0;
-    room = mix(room, ground_image(p, r, alpha), share);
+    room = mix(room, ground_image(p, r, alpha, share > 0.0), share);
 #endif
     return room;
 }
