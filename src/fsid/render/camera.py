@@ -23,14 +23,12 @@ NEAR_M = 0.02
 MODELS = {"brown-conrady": (1, 5), "fisheye": (2, 4)}
 """Distortion model -> its number in shaders/lens.glsl and how many coefficients it has."""
 
-_STRAIGHT = 3
-"""LENS of shaders/lens.glsl that looks a pinhole image up in a larger one."""
-
 _WIDEST_TANGENT = 6.0
 _MOST_PIXELS = 3.0
 _MAX_SOFTNESS_PX = 50.0
 _MAX_SHARPENING = 5.0
 _MAX_COLOUR_CONTRAST = 0.5
+_MAX_FRINGE = 0.05
 
 
 @dataclass(frozen=True)
@@ -72,6 +70,8 @@ def lens_of(camera: Camera, time_s: float | None = None) -> Lens:
             f"scene.cameras: colour_contrast {camera.colour_contrast}: "
             f"must be -{_MAX_COLOUR_CONTRAST:g} .. {_MAX_COLOUR_CONTRAST:g}"
         )
+    if not all(abs(growth) < _MAX_FRINGE for growth in camera.chromatic_aberration):
+        raise FsidError(f"scene.cameras: chromatic_aberration must be within +-{_MAX_FRINGE:g}")
     forward /= np.linalg.norm(forward)
     right /= np.linalg.norm(right)
     rotation = np.stack([right, np.cross(right, forward), forward])
@@ -80,9 +80,9 @@ def lens_of(camera: Camera, time_s: float | None = None) -> Lens:
     position = position + np.array(camera.velocity_m_s) * since
     focal_x = 1.0 / np.tan(np.radians(camera.fov_deg) / 2)
     focal = (float(focal_x), float(focal_x * camera.width / camera.height))
-    if camera.distortion is None and camera.chromatic_aberration == (0.0, 0.0):
+    if camera.distortion is None:
         return Lens(rotation, position, focal, (camera.width, camera.height), focal, 0, (0.0,) * 5)
-    return _bent(camera, rotation, position, focal)
+    return _bent(camera, camera.distortion, rotation, position, focal)
 
 
 def distorted(distortion: Distortion | None, points: np.ndarray) -> np.ndarray:
@@ -171,15 +171,18 @@ def _check_model(distortion: Distortion) -> None:
         raise FsidError(f"scene.cameras: distortion '{distortion.model}' needs {count} coefficients")
 
 
-def _bent(camera: Camera, rotation: np.ndarray, position: np.ndarray, focal: tuple[float, float]) -> Lens:
+def _bent(
+    camera: Camera,
+    distortion: Distortion,
+    rotation: np.ndarray,
+    position: np.ndarray,
+    focal: tuple[float, float],
+) -> Lens:
     """The pinhole image covers all rays of the bent one, at its finest resolution."""
-    red, blue = camera.chromatic_aberration
-    if not (abs(red) < 0.05 and abs(blue) < 0.05):
-        raise FsidError("scene.cameras: chromatic_aberration must be within +-0.05")
     widest = 1.0 + 2.0 / min(camera.width, camera.height)
     t = np.linspace(-widest, widest, 65)
-    image = np.stack(np.meshgrid(t, t), axis=-1) / np.array(focal) / (1 + min(red, blue, 0.0))
-    rays = undistorted(camera.distortion, image)
+    image = np.stack(np.meshgrid(t, t), axis=-1) / np.array(focal)
+    rays = undistorted(distortion, image)
     low, high = rays.reshape(-1, 2).min(0), rays.reshape(-1, 2).max(0)
     half = np.maximum(np.abs(low), np.abs(high)) * 1.001
     if half.max() > _WIDEST_TANGENT:
@@ -190,8 +193,6 @@ def _bent(camera: Camera, rotation: np.ndarray, position: np.ndarray, focal: tup
     pixels = np.minimum(np.ceil(pixels / 2) * 2, np.ceil(size * _MOST_PIXELS / 2) * 2)
     seen_px = (int(pixels[0]), int(pixels[1]))
     seen_focal = (float(1 / half[0]), float(1 / half[1]))
-    if camera.distortion is None:
-        return Lens(rotation, position, focal, seen_px, seen_focal, _STRAIGHT, (0.0,) * 5)
-    given = camera.distortion.coefficients
+    given = distortion.coefficients
     k = (*given, *(0.0,) * (5 - len(given)))
-    return Lens(rotation, position, focal, seen_px, seen_focal, MODELS[camera.distortion.model][0], k)
+    return Lens(rotation, position, focal, seen_px, seen_focal, MODELS[distortion.model][0], k)

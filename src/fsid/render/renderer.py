@@ -30,6 +30,7 @@ from fsid.render.drawable import View, view_of
 from fsid.render.exposure import Shot, is_moving, shots_of
 from fsid.render.flow import flow_between
 from fsid.render.frame import Frame
+from fsid.render.fringes import magnified, with_margin
 from fsid.render.layers import Layer, LayerStore, fitting_size
 from fsid.render.mirror import mirror_shot
 from fsid.render.occlusion_pass import OcclusionPass
@@ -179,7 +180,9 @@ class Renderer:
         """
         if Renderer._active is not self:
             raise FsidError("this Renderer is closed")
-        camera = view.camera
+        asked = view.camera
+        camera, margin = with_margin(asked)
+        view = replace(view, camera=camera)
         shot = Shot(lens_of(camera), camera.time_s, shift_px)
         self._draw(view, shot, bake, mark)
         frame = self._targets.read_frame(labels=labels or is_moving(camera, view.drawables))
@@ -195,9 +198,12 @@ class Renderer:
                 self._draw(view, part, bake, mark)
                 radiance += _through_lens(part, camera, *self._targets.read_radiance())
             radiance /= np.float32(len(shots))
-        set_sharpness(radiance, camera)
-        set_colour_contrast(radiance, camera)
-        return replace(frame, radiance=radiance)
+        radiance = magnified(radiance, asked, margin)
+        set_sharpness(radiance, asked)
+        set_colour_contrast(radiance, asked)
+        inner = (slice(margin, margin + asked.height), slice(margin, margin + asked.width))
+        labels_of = (frame.albedo, frame.normal, frame.depth, frame.object_id)
+        return Frame(radiance, *(label[inner] for label in labels_of))
 
     def wait(self) -> None:
         """Return when everything issued so far is done; only measuring needs it."""
@@ -239,7 +245,7 @@ class Renderer:
         """The image that smooth ground shows, with what lies below the ground cut off."""
         targets, size = self._mirror_targets, below.lens.seen_px
         targets.resize(size, size)
-        camera = replace(stage.view.camera, width=size[0], vignetting=ZERO, chromatic_aberration=(0.0, 0.0))
+        camera = replace(stage.view.camera, width=size[0], vignetting=ZERO)
         stage = replace(stage, view=replace(stage.view, camera=camera))
         self._samples.draw(targets, stage, buffers, below, lowest_m=_ABOVE_GROUND_M)
         self._occlusion.draw(targets, buffers, below)

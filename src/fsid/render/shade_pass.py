@@ -89,10 +89,7 @@ class ShadePass:
         self._shadows.use(program, stage.plan)
         self._reflectance.use(14)
         buffers.use()
-        red, blue = camera.chromatic_aberration
-        for aberration, colours in _colour_passes(red, blue):
-            set_uniforms(program, magnification=1.0 + aberration)
-            targets.draw(lambda: buffers.draw_screen(program), colours)
+        targets.draw(lambda: buffers.draw_screen(program))
 
     def _program(self, lens_model: int, stage: Stage, **defines: int) -> moderngl.Program:
         defines |= {"LENS": lens_model, "LOBES": int(stage.has_lobes), "AREAS": int(stage.has_areas)}
@@ -139,10 +136,3 @@ def _places(spheres: np.ndarray, shot: Shot, size: tuple[int, int]) -> list[Plac
     if lens.model:
         return [(0, 0, *size)]
     return rectangles(spheres, lens.position, lens.rotation, lens.seen_focal, shot.seen_shift, lens.seen_px)
-
-
-def _colour_passes(red: float, blue: float) -> list[tuple[float, tuple[bool, bool, bool]]]:
-    """(magnification - 1, which of R, G, B) of each pass; labels belong to green."""
-    if red == blue == 0.0:
-        return [(0.0, (True, True, True))]
-    return [(red, (True, False, False)), (0.0, (False, True, False)), (blue, (False, False, True))]

@@ -133,11 +133,9 @@ class Targets:
             texture.use(unit)
         self._drawn = (self._results[0], self._drawn[1])
 
-    def draw(self, draw_screen: Callable[[], None], colours: tuple[bool, bool, bool] = (True,) * 3) -> None:
-        """Draw every place; some colours only, of which green takes depth and labels along."""
+    def draw(self, draw_screen: Callable[[], None]) -> None:
+        """Draw every place."""
         (framebuffer, *_), places = self._drawn
-        green = colours[1]
-        framebuffer.color_mask = ((*colours, green), (green,) * 4, (green,) * 4)
         for place in places:
             framebuffer.scissor = place
             framebuffer.use()

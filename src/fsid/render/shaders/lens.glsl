@@ -1,5 +1,5 @@
 // Pixels of the image -> rays -> samples of the G-buffer, which is a pinhole image.
-// LENS: 0 pinhole, 1 Brown-Conrady, 2 fisheye, 3 pinhole of another size (chromatic aberration alone).
+// LENS: 0 pinhole, 1 Brown-Conrady, 2 fisheye.
 uniform ivec2 size;        // of the image, pixels
 uniform ivec2 seen;        // of the G-buffer, pixels
 uniform vec2 focal;        // of the image's camera, half image sizes
@@ -7,11 +7,10 @@ uniform vec2 seen_focal;   // of the G-buffer's
 uniform vec2 seen_shift;   // of the G-buffer, half image sizes
 uniform vec2 shift;        // of the image, pixels
 uniform vec2 lens_offset;  // of the rays (x, y): place on the lens / distance of the sharp plane
-uniform float magnification;   // of this colour
 uniform float k[5];
 
 // Normalised coordinates (x right, y down) whose distorted image is at `d`: Newton's method.
-#if LENS == 0 || LENS == 3
+#if LENS == 0
 vec2 undistorted(vec2 d) { return d; }
 #elif LENS == 1
 vec2 undistorted(vec2 d) {
@@ -44,7 +43,7 @@ vec2 undistorted(vec2 d) {
 
 // The ray through a point of the image (pixels): x right, y up, and 1 along the viewing axis.
 vec3 ray_at(vec2 pixel) {
-    vec2 ndc = ((pixel - shift) / vec2(size) * 2.0 - 1.0) / magnification;
+    vec2 ndc = (pixel - shift) / vec2(size) * 2.0 - 1.0;
     vec2 p = undistorted(ndc / focal);
     return vec3(vec2(p.x, -p.y) - lens_offset, 1.0);
 }

@@ -1,0 +1,74 @@
+"""Lateral chromatic aberration: a lens that magnifies red and blue by 1 + a relative to green.
+
+    red(x) = image(c + (x - c) / (1 + a)),      c the middle of the image, likewise blue
+
+Both are interpolated in the image that green sees, drawn with a margin from which the edges of a smaller one
+come: by Lanczos' kernel along rows, then columns, within a quarter of the values around (no black rings).
+Labels are green's. docs/results.md has what that costs beside shading every colour anew.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from fsid.scene.model import Camera
+
+_REACH = 4
+"""Pixels on either side that are interpolated."""
+_BEYOND = np.float32(0.25)
+"""Share of the least and of the greatest value around by which an interpolated one may lie beyond it."""
+
+
+def with_margin(camera: Camera) -> tuple[Camera, int]:
+    """The camera whose larger image holds what red and blue of `camera` show, and by how many pixels it is
+    larger on every side: 0 where that is nothing."""
+    smallest = 1 + min(camera.chromatic_aberration)
+    if smallest >= 1:
+        return camera, 0
+    beyond = max(camera.width, camera.height) / 2 * (1 / smallest - 1)
+    margin = int(np.ceil(beyond)) + _REACH
+    width, height = camera.width + 2 * margin, camera.height + 2 * margin
+    tangent = np.tan(np.radians(camera.fov_deg) / 2) * width / camera.width
+    corner2 = (width**2 + height**2) / (camera.width**2 + camera.height**2)
+    a1, a2, a3 = camera.vignetting
+    larger = replace(
+        camera,
+        width=width,
+        height=height,
+        fov_deg=float(np.degrees(2 * np.arctan(tangent))),
+        vignetting=(a1 * corner2, a2 * corner2**2, a3 * corner2**3),
+    )
+    return larger, margin
+
+
+def magnified(radiance: np.ndarray, camera: Camera, margin: int) -> np.ndarray:
+    """The (H, W, 3) image of `camera` from `radiance`, that of the camera `with_margin`."""
+    if not any(camera.chromatic_aberration):
+        return radiance
+    inner = radiance[margin : margin + camera.height, margin : margin + camera.width].copy()
+    for colour, growth in zip((0, 2), camera.chromatic_aberration, strict=True):
+        plane = radiance[..., colour]
+        for axis, size in enumerate((camera.height, camera.width)):
+            middle = (size - 1) / 2
+            plane = _interpolated(plane, (np.arange(size) - middle) / (1 + growth) + middle + margin, axis)
+        inner[..., colour] = plane
+    return inner
+
+
+def _interpolated(plane: np.ndarray, places: np.ndarray, axis: int) -> np.ndarray:
+    """`plane` (H, W), 0 or more, at `places` along an axis."""
+    first = np.floor(places).astype(int)
+    steps = np.arange(1 - _REACH, _REACH + 1)
+    away = (places - first)[:, None] - steps
+    weights = np.sinc(away) * np.sinc(away / _REACH)
+    weights = (weights / weights.sum(1, keepdims=True)).astype(np.float32)
+    total: np.ndarray | float = 0.0
+    least, most = np.float32(np.inf), np.float32(-np.inf)
+    for step, weight in zip(steps, weights.T, strict=True):
+        value = np.take(plane, np.clip(first + step, 0, plane.shape[axis] - 1), axis)
+        total = total + value * (weight[:, None] if axis == 0 else weight)
+        if -1 <= step <= 2:
+            least, most = np.minimum(least, value), np.maximum(most, value)
+    return np.asarray(np.clip(total, (1 - _BEYOND) * least, (1 + _BEYOND) * most))

@@ -1,0 +1,102 @@
+"""Red and blue of a lens with lateral chromatic aberration: interpolated in the image that green sees."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fsid.render import Frame, Renderer
+from fsid.render.camera import lens_of
+from fsid.render.drawable import view_of
+from fsid.render.fringes import magnified, with_margin
+from fsid.scene import SceneConfig, sample
+from fsid.scene.model import Camera
+from render_scenes import FROM_ABOVE
+
+FRINGED = replace(FROM_ABOVE, width=96, height=64, chromatic_aberration=(-0.03, 0.02))
+
+
+def waves(camera: Camera, red: float = 0.0, blue: float = 0.0, *, period_px: float) -> np.ndarray:
+    """(H, W, 3) waves about the middle, red and blue of them magnified."""
+    y, x = (np.arange(size) - (size - 1) / 2 for size in (camera.height, camera.width))
+    across, down = (2 * np.pi / period_px * direction for direction in (0.8, 0.6))
+    planes = [
+        2 + np.sin(across * x / (1 + growth)) * np.cos(down * y[:, None] / (1 + growth))
+        for growth in (red, 0.0, blue)
+    ]
+    return np.stack(planes, -1).astype(np.float32)
+
+
+def test_waves_are_magnified_up_to_the_edges() -> None:
+    """Waves of five pixels keep their place and 97 % of their height, at the borders too."""
+    larger, margin = with_margin(FRINGED)
+    wanted = waves(FRINGED, *FRINGED.chromatic_aberration, period_px=5.0)
+    found = magnified(waves(larger, period_px=5.0), FRINGED, margin)
+    np.testing.assert_array_equal(found[..., 1], wanted[..., 1])
+    np.testing.assert_allclose(found, wanted, atol=0.06)
+    assert np.abs(found - wanted)[..., [0, 2]].std() < 0.015
+
+
+def test_a_lamp_has_no_black_ring() -> None:
+    """Nothing beside it loses more than a quarter per axis, and nothing is much brighter than the lamp."""
+    larger, margin = with_margin(FRINGED)
+    image = np.ones((larger.height, larger.width, 3), np.float32)
+    image[20:40, 30:60] = 1000.0
+    found = magnified(image, FRINGED, margin)
+    assert found.min() >= 0.75**2
+    assert found.max() <= 1000.0 * 1.25**2
+
+
+def test_a_lens_without_fringes_needs_no_margin() -> None:
+    assert with_margin(FROM_ABOVE) == (FROM_ABOVE, 0)
+    only_larger = replace(FROM_ABOVE, chromatic_aberration=(0.01, 0.002))
+    assert with_margin(only_larger) == (only_larger, 0)
+
+
+def test_the_larger_camera_is_the_same_lens() -> None:
+    """Pixels of the same size, the same darkening at the same place."""
+    camera = replace(FRINGED, vignetting=(-0.3, 0.1, -0.2))
+    larger, margin = with_margin(camera)
+    assert (larger.width, larger.height) == (96 + 2 * margin, 64 + 2 * margin)
+    for axis, (size, more) in enumerate(((96, larger.width), (64, larger.height))):
+        assert lens_of(larger).focal[axis] * more == pytest.approx(lens_of(camera).focal[axis] * size)
+    r2 = np.array([0.1, 0.5, 1.0])
+    more_r2 = r2 * (96**2 + 64**2) / (larger.width**2 + larger.height**2)
+    gains = [
+        sum(a * q ** (i + 1) for i, a in enumerate(seen.vignetting))
+        for seen, q in ((camera, r2), (larger, more_r2))
+    ]
+    np.testing.assert_allclose(*gains)
+
+
+def test_a_scene_is_what_lenses_of_other_focal_lengths_see() -> None:
+    """Red and blue of one each, behind a point spread of a pixel; green and labels as without fringes."""
+    scene = sample(SceneConfig(objects=(12, 12)), 4, width=240, height=136)
+    eye = scene.cameras[0]
+    camera = Camera(eye.position_m, eye.target_m, eye.up, eye.fov_deg, eye.width, eye.height, softness_px=1.0)
+    with Renderer(texture_size=64) as renderer:
+
+        def draw(camera: Camera) -> Frame:
+            return renderer.draw(view_of(replace(scene, cameras=(camera,)), 0))
+
+        def magnifying(growth: float) -> Camera:
+            tangent = np.tan(np.radians(camera.fov_deg) / 2) / (1 + growth)
+            return replace(camera, fov_deg=float(np.degrees(2 * np.arctan(tangent))))
+
+        plain = draw(camera)
+        fringed = draw(replace(camera, chromatic_aberration=(-0.01, 0.006)))
+        alone = [draw(magnifying(growth)).radiance for growth in (-0.01, 0.0, 0.006)]
+    white = np.quantile(plain.radiance, 0.97)
+    for colour, image in enumerate(alone):
+        found, without, wanted = (
+            np.clip(radiance[..., colour] / white, 0, 1)
+            for radiance in (fringed.radiance, plain.radiance, image)
+        )
+        assert (found - wanted).std() < (0.02 if colour == 1 else 0.8 * (without - wanted).std())
+    same = fringed.object_id == plain.object_id
+    assert same.mean() > 0.99
+    assert fringed.albedo.shape == fringed.normal.shape == fringed.radiance.shape == plain.radiance.shape
+    near = np.isfinite(plain.depth) & same
+    np.testing.assert_allclose(np.median(fringed.depth[near] / plain.depth[near]), 1.0, rtol=1e-3)
