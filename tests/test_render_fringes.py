@@ -12,7 +12,7 @@ from fsid.render.camera import lens_of
 from fsid.render.drawable import view_of
 from fsid.render.fringes import magnified, with_margin
 from fsid.scene import SceneConfig, sample
-from fsid.scene.model import Camera
+from fsid.scene.model import Camera, Distortion
 from render_scenes import FROM_ABOVE
 
 FRINGED = replace(FROM_ABOVE, width=96, height=64, chromatic_aberration=(-0.03, 0.02))
@@ -53,6 +53,21 @@ def test_a_lens_without_fringes_needs_no_margin() -> None:
     assert with_margin(FROM_ABOVE) == (FROM_ABOVE, 0)
     only_larger = replace(FROM_ABOVE, chromatic_aberration=(0.01, 0.002))
     assert with_margin(only_larger) == (only_larger, 0)
+
+
+@pytest.mark.parametrize(("fov_deg", "wanted"), [(50.0, 5), (56.0, 2), (58.0, 0)])
+def test_a_lens_that_folds_just_outside_keeps_its_image(fov_deg: float, wanted: int) -> None:
+    """Where a margin of 5 pixels is too much for it; the image has its size, red and blue their edges."""
+    folding = Distortion("brown-conrady", (-0.3, 0.0, 0.0, 0.0, 0.0))
+    eye = replace(FRINGED, fov_deg=fov_deg, distortion=folding, chromatic_aberration=(-0.001, 0.0005))
+    lens_of(eye)
+    larger, margin = with_margin(eye)
+    assert margin == wanted
+    lens_of(larger)
+    image = waves(larger, period_px=30.0)
+    found = magnified(image, eye, margin)
+    assert found.shape == (64, 96, 3)
+    np.testing.assert_allclose(found, waves(eye, period_px=30.0), atol=0.1)
 
 
 def test_the_larger_camera_is_the_same_lens() -> None:

@@ -13,6 +13,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from fsid.errors import FsidError
+from fsid.render.camera import lens_of
 from fsid.scene.model import Camera
 
 _REACH = 4
@@ -23,24 +25,35 @@ _BEYOND = np.float32(0.25)
 
 def with_margin(camera: Camera) -> tuple[Camera, int]:
     """The camera whose larger image holds what red and blue of `camera` show, and by how many pixels it is
-    larger on every side: 0 where that is nothing."""
+    larger on every side: 0 where that is nothing. Less where its lens cannot be inverted that far out; there
+    the border of red and blue is repeated."""
     smallest = 1 + min(camera.chromatic_aberration)
     if smallest >= 1:
         return camera, 0
     beyond = max(camera.width, camera.height) / 2 * (1 / smallest - 1)
     margin = int(np.ceil(beyond)) + _REACH
+    while margin:
+        larger = _enlarged(camera, margin)
+        try:
+            lens_of(larger)
+            return larger, margin
+        except FsidError:
+            margin //= 2
+    return camera, 0
+
+
+def _enlarged(camera: Camera, margin: int) -> Camera:
     width, height = camera.width + 2 * margin, camera.height + 2 * margin
     tangent = np.tan(np.radians(camera.fov_deg) / 2) * width / camera.width
     corner2 = (width**2 + height**2) / (camera.width**2 + camera.height**2)
     a1, a2, a3 = camera.vignetting
-    larger = replace(
+    return replace(
         camera,
         width=width,
         height=height,
         fov_deg=float(np.degrees(2 * np.arctan(tangent))),
         vignetting=(a1 * corner2, a2 * corner2**2, a3 * corner2**3),
     )
-    return larger, margin
 
 
 def magnified(radiance: np.ndarray, camera: Camera, margin: int) -> np.ndarray:
