@@ -3,9 +3,10 @@
     a camera at M x with axes M R, M = diag(1, 1, -1), sees at each pixel what a mirror in z = 0 shows there
 
 because p on the plane and the mirror image of what it reflects lie on one ray of the camera. `Background` has
-its ground, or the top of its table, at z = 0. The image is half as large, without glass and without what
-shines: lights have highlights of their own. It is made only where the ground is smooth enough to show any,
-and indoors: out of doors the ground is flat for a few metres only, and its reflection would end in a line.
+its ground, or the top of its table, at z = 0. The image is half as large, or a quarter where the ground blurs
+it anyway, without glass and without what shines: lights have highlights of their own. It is made only where
+the ground is smooth enough to show any, and indoors: out of doors the ground is flat for a few metres only,
+and its reflection would end in a line.
 """
 
 from __future__ import annotations
@@ -22,17 +23,20 @@ from fsid.scene.model import Material
 ROUGHEST = 0.5
 """Mean roughness from which ground shows nothing but the walls; shaders/shade.frag fades towards it."""
 
+_BLURRING = 0.25
+"""Mean roughness from which an image of a quarter of the size does."""
 _LEAST_COAT = 0.05
 _FLAT_M = 1e-3
 
 
 def mirror_shot(view: View, shot: Shot, roughness_of: Callable[[Material], float]) -> Shot | None:
-    """The shot from below, half as large; None without smooth ground in z = 0, or below it."""
+    """The smaller shot from below; None without smooth ground in z = 0, or below it."""
     indoors, above = view.sky is None, shot.lens.position[2] > 10 * _FLAT_M
-    if not (indoors and above and _is_smooth(view, roughness_of)):
+    roughness = _least_roughness(view, roughness_of) if indoors and above else 1.0
+    if roughness >= ROUGHEST:
         return None
-    lens = shot.lens
-    size = (-(-lens.seen_px[0] // 2), -(-lens.seen_px[1] // 2))
+    lens, times = shot.lens, 2 if roughness < _BLURRING else 4
+    size = (-(-lens.seen_px[0] // times), -(-lens.seen_px[1] // times))
     below = replace(
         lens,
         rotation=lens.rotation * (1.0, 1.0, -1.0),
@@ -46,7 +50,9 @@ def mirror_shot(view: View, shot: Shot, roughness_of: Callable[[Material], float
     return replace(shot, lens=below, shift_px=(x * size[0] / 2, y * size[1] / 2), lens_offset=(0.0, 0.0))
 
 
-def _is_smooth(view: View, roughness_of: Callable[[Material], float]) -> bool:
+def _least_roughness(view: View, roughness_of: Callable[[Material], float]) -> float:
+    """Mean roughness of the smoothest ground or coat in z = 0; 1 without ground there."""
+    least = 1.0
     for drawable in view.drawables:
         if drawable.object_id != BACKGROUND_ID or not drawable.casts:
             continue
@@ -55,6 +61,5 @@ def _is_smooth(view: View, roughness_of: Callable[[Material], float]) -> bool:
         for part in np.unique(mesh.face_parts[flat[mesh.faces].all(1)]):
             material = drawable.materials[int(part)]
             coat = material.clearcoat_roughness if material.clearcoat >= _LEAST_COAT else 1.0
-            if min(roughness_of(material), coat) < ROUGHEST:
-                return True
-    return False
+            least = min(least, roughness_of(material), coat)
+    return least
