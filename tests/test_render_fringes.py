@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fsid.errors import FsidError
 from fsid.render import Frame, Renderer
 from fsid.render.camera import lens_of
 from fsid.render.drawable import view_of
@@ -68,6 +69,12 @@ def test_a_lens_that_folds_just_outside_keeps_its_image(fov_deg: float, wanted: 
     found = magnified(image, eye, margin)
     assert found.shape == (64, 96, 3)
     np.testing.assert_allclose(found, waves(eye, period_px=30.0), atol=0.1)
+
+
+@pytest.mark.parametrize("fringes", [(-1.0, 0.0), (0.0, -1.5), (float("nan"), 0.0), (0.06, 0.0)])
+def test_fringes_that_no_lens_has_are_refused(fringes: tuple[float, float]) -> None:
+    with pytest.raises(FsidError, match=r"chromatic_aberration must be within \+-0.05"):
+        with_margin(replace(FRINGED, chromatic_aberration=fringes))
 
 
 def test_the_larger_camera_is_the_same_lens() -> None:

@@ -26,7 +26,8 @@ _BEYOND = np.float32(0.25)
 def with_margin(camera: Camera) -> tuple[Camera, int]:
     """The camera whose larger image holds what red and blue of `camera` show, and by how many pixels it is
     larger on every side: 0 where that is nothing. Less where its lens cannot be inverted that far out; there
-    the border of red and blue is repeated."""
+    the border of red and blue is repeated. FsidError as `lens_of` of the camera itself."""
+    lens_of(camera)
     smallest = 1 + min(camera.chromatic_aberration)
     if smallest >= 1:
         return camera, 0
