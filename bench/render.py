@@ -31,7 +31,7 @@ from fsid.scene.camera_config import LensConfig
 from fsid.scene.config import BackgroundConfig, LightConfig, MaterialConfig
 
 SIZES = ((960, 540), (1920, 1080))
-STAGES = ("scene build", "upload", "shadows", "mirror", "samples", "occlusion", "shading", "readback")
+STAGES = ("scene build", "upload", "samples", "occlusion", "shadows", "mirror", "shading", "readback")
 
 
 def main() -> None:
@@ -72,7 +72,13 @@ def scenes_of(count: int, width: int, height: int, *, plain: bool = False) -> li
             background=BackgroundConfig(kind_shares=(1.0, 0.0, 0.0, 0.0)),
             lights=LightConfig(count=(3, 3), kind_shares=(0.6, 0.4, 0.0)),
             lens=LensConfig(
-                blur_share=0.0, vignetting_share=0.0, fringe_share=0.0, soft_share=0.0, sharp_share=0.0
+                blur_share=0.0,
+                vignetting_share=0.0,
+                fringe_share=0.0,
+                soft_share=0.0,
+                sharp_share=0.0,
+                contrast_red=(0.0, 0.0),
+                contrast_blue=(0.0, 0.0),
             ),
         )
     scenes = [sample(config, seed, width=width, height=height) for seed in range(count)]
