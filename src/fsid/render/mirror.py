@@ -3,10 +3,10 @@
     a camera at M x with axes M R, M = diag(1, 1, -1), sees at each pixel what a mirror in z = 0 shows there
 
 because p on the plane and the mirror image of what it reflects lie on one ray of the camera. `Background` has
-its ground, or the top of its table, at z = 0. The image is half as large, or a quarter where the ground blurs
-it anyway, without glass and without what shines: lights have highlights of their own. It is made only where
-the ground is smooth enough to show any, and indoors: out of doors the ground is flat for a few metres only,
-and its reflection would end in a line.
+its ground, or the top of its table, at z = 0. The image is a third as large, or a quarter where the ground
+blurs it anyway, without glass and without what shines: lights have highlights of their own. It is made only
+where the ground is smooth enough to show any, and indoors: out of doors the ground is flat for a few metres
+only, and its reflection would end in a line.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def mirror_shot(view: View, shot: Shot, roughness_of: Callable[[Material], float
     roughness = _least_roughness(view, roughness_of) if indoors and above else 1.0
     if roughness >= ROUGHEST:
         return None
-    lens, times = shot.lens, 2 if roughness < _BLURRING else 4
+    lens, times = shot.lens, 3 if roughness < _BLURRING else 4
     size = (-(-lens.seen_px[0] // times), -(-lens.seen_px[1] // times))
     below = replace(
         lens,
