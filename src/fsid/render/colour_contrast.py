@@ -28,6 +28,6 @@ def set_colour_contrast(radiance: np.ndarray, camera: Camera) -> None:
     luminance = radiance @ LUMINANCE.astype(np.float32)
     middle = np.median(luminance[::_STRIDE, ::_STRIDE])
     if middle > 0:
-        relative = np.clip(luminance / middle, *_RANGE)
+        logs = np.log(np.clip(luminance / middle, *_RANGE))  # numpy's power takes three times as long
         for colour, extra in zip((0, 2), camera.colour_contrast, strict=True):
-            radiance[..., colour] *= relative ** np.float32(extra)
+            radiance[..., colour] *= np.exp(np.float32(extra) * logs)

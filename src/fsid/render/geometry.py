@@ -89,7 +89,8 @@ def merge(drawables: Sequence[Drawable], layer_of: Callable[[Material], Layer], 
         vertices.append(mesh_vertices)
         world.append(positions)
         indices.append(faces + np.uint32(first_vertex))
-        low, high = drawable.mesh.vertices.min(0), drawable.mesh.vertices.max(0)
+        columns = drawable.mesh.vertices.T
+        low, high = (np.array([f(column) for column in columns]) for f in (np.min, np.max))
         thickness_m = _GLASS_SHARE * (high - low).min() * min(drawable.transform.scale)
         surfaces += [
             _surface(drawable, material, layer_of(material), thickness_m, time_s)
