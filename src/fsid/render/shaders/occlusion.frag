@@ -6,7 +6,7 @@
 #include "encoding.glsl"
 layout(binding = 0) uniform usampler2D samples;
 layout(binding = 1) uniform sampler2D depth;    // metres, of the blocks; 0 = no hit
-layout(binding = 7) uniform sampler2D tap_table;   // row 2
+layout(binding = 7) uniform sampler2D tap_table;   // row 2: where the spirals begin
 uniform int stride;      // samples per block and axis
 uniform vec2 focal;      // half image sizes
 uniform vec2 shift;      // half image sizes
@@ -17,32 +17,41 @@ layout(location = 0) out vec2 result;
 
 const float RADIUS_M = 0.35;
 const float MAX_SCREEN = 0.2;   // of the image width
+const float GOLDEN_ANGLE = 2.3999632;
+const vec2 TURN = vec2(cos(4.0 * GOLDEN_ANGLE), sin(4.0 * GOLDEN_ANGLE));   // from a tap to the next of its spiral
 
-vec3 at(ivec2 block, out bool hit) {
-    float z = texelFetch(depth, block, 0).r;
-    hit = z > 0.0;
-    vec2 ndc = (vec2(block * stride + stride / 2) + 0.5) / vec2(size * stride) * 2.0 - 1.0 - shift;
-    return vec3(ndc.x / focal.x, -ndc.y / focal.y, 1.0) * z;
+// Points (x right, y down, 1) of the image plane at distance 1: first * block + second.
+void image_plane(out vec2 first, out vec2 second) {
+    vec2 flip = vec2(1, -1) / focal, all = vec2(size * stride);
+    first = flip * (2.0 * float(stride) / all);
+    second = flip * ((2.0 * float(stride / 2) + 1.0) / all - 1.0 - shift);
 }
 
 void main() {
     ivec2 block = ivec2(gl_FragCoord.xy);
-    bool hit;
-    vec3 p = at(block, hit);
+    vec2 first, second;
+    image_plane(first, second);
+    float z = texelFetch(depth, block, 0).r;
+    bool hit = z > 0.0;
+    vec3 p = vec3(vec2(block) * first + second, 1.0) * z;
     vec3 n = axes * unpack_direction(texelFetch(samples, block * stride + stride / 2, 0).y);
-    float reach = min(0.5 * RADIUS_M * focal.x / max(p.z, 1e-3), MAX_SCREEN) * float(size.x);
+    float reach = min(0.5 * RADIUS_M * focal.x / max(z, 1e-3), MAX_SCREEN) * float(size.x);
     float r2 = RADIUS_M * RADIUS_M, sum = 0.0;
-    float floor_m = 0.004 + 0.003 * p.z;
+    float floor_m = 0.004 + 0.003 * z;
     int spiral = (block.x & 1) + 2 * (block.y & 1);
+    vec2 tap = texelFetch(tap_table, ivec2(spiral, 2), 0).xy;
+    float radius = length(tap) * reach;
+    vec2 direction = normalize(tap);
     int i = 0, count = hit ? taps : 0;
     do {
-        vec2 tap = texelFetch(tap_table, ivec2(4 * i + spiral, 2), 0).xy;
-        ivec2 other = clamp(block + ivec2(round(tap * reach)), ivec2(0), size - 1);
-        bool other_hit;
-        vec3 v = at(other, other_hit) - p;
+        ivec2 other = clamp(block + ivec2(round(radius * direction)), ivec2(0), size - 1);
+        direction = mat2(TURN.x, TURN.y, -TURN.y, TURN.x) * direction;
+        radius += reach / float(taps);
+        float other_z = texelFetch(depth, other, 0).r;
+        vec3 v = vec3(vec2(other) * first + second, 1.0) * other_z - p;
         float vv = dot(v, v), f = max(r2 - vv, 0.0);
-        sum += other_hit ? f * f * f * max(dot(v, n) - floor_m, 0.0) / (vv + 0.0004) : 0.0;
+        sum += other_z > 0.0 ? f * f * f * max(dot(v, n) - floor_m, 0.0) / (vv + 0.0004) : 0.0;
     } while (++i < count);
     float covered = sum * 5.0 * RADIUS_M / (r2 * r2 * r2 * float(taps));
-    result = hit ? vec2(max(1.0 - covered, 0.1), p.z) : vec2(1.0, 0.0);
+    result = hit ? vec2(max(1.0 - covered, 0.1), z) : vec2(1.0, 0.0);
 }

@@ -10,7 +10,7 @@ layout(location = 0) out uvec4 out_sample;
 
 void main() {
     vec3 face = cross(dFdx(from_camera), dFdy(from_camera));
-    face = dot(face, face) > 0.0 ? normalize(face) : normal;
-    if (dot(face, from_camera) > 0.0) face = -face;
+    face = dot(face, face) > 0.0 ? face : normal;
+    face = dot(face, from_camera) > 0.0 ? -face : face;
     out_sample = uvec4(pack_direction(normal), pack_direction(face), surface + 1u, floatBitsToUint(distance_m));
 }
