@@ -1,8 +1,8 @@
 """Scene -> Frame in passes with fixed taps, so that an image holds no noise:
 
-    shadows     depth from every light into one atlas, and its moments
     samples     surface, normal and depth of `supersampling`^2 samples per pixel
     occlusion   openness of each block of 2 x 2 pixels to its surroundings
+    shadows     depth from every light into one atlas, and its moments
     shading     materials and radiance of each pixel, once per surface in it; the result is read back
 
 The same scene gives the same bits on the same driver whatever was rendered before: buffers that depend on
@@ -221,12 +221,18 @@ class Renderer:
         stage = replace(stage, geometry=stage.geometry.without_vertices())
         try:
             mark("upload")
+            # Shadows come third: a CPU makes their triangles ready while it draws the first two.
+            self._samples.draw(self._targets, stage, buffers, shot)
+            mark("samples")
+            self._occlusion.draw(self._targets, buffers, shot)
+            mark("occlusion")
             self._shadows.draw(stage, buffers, [shot] if below is None else [shot, below])
             mark("shadows")
             if below is not None:
                 self._draw_mirror(stage, buffers, below)
                 mark("mirror")
-            self._draw_passes(stage, buffers, shot, self._mirror_targets if below is not None else None, mark)
+            self._draw_light(stage, buffers, shot, self._mirror_targets if below is not None else None)
+            mark("shading")
         finally:
             buffers.release()
             self._mirror_targets.release()
@@ -252,21 +258,15 @@ class Renderer:
         self._shadows.draw_blocks(targets, stage, buffers, below)
         self._shade.draw(targets, stage, buffers, below, self._layers, shining=False)
 
-    def _draw_passes(
-        self, stage: Stage, buffers: Buffers, shot: Shot, mirror: Targets | None, mark: Mark
-    ) -> None:
+    def _draw_light(self, stage: Stage, buffers: Buffers, shot: Shot, mirror: Targets | None) -> None:
+        """The result, from samples, occlusion and shadows."""
         targets = self._targets
-        self._samples.draw(targets, stage, buffers, shot)
-        mark("samples")
-        self._occlusion.draw(targets, buffers, shot)
-        mark("occlusion")
         self._shadows.draw_blocks(targets, stage, buffers, shot)
         self._shade.draw(targets, stage, buffers, shot, self._layers, mirror=mirror)
         if stage.glass.any():
             self._samples.draw_glass(targets, stage, buffers, shot)
             self._shade.draw_glass(targets, stage, buffers, shot, self._layers)
         self._context.finish()
-        mark("shading")
 
 
 def _through_lens(shot: Shot, camera: Camera, radiance: np.ndarray, depth: np.ndarray) -> np.ndarray:

@@ -1,5 +1,9 @@
 """Shading: materials and radiance of each pixel, once per surface in it; glass over it in a second round.
 
+Most pixels find their shadows between those of the blocks. Lights whose shadow must be found in the pixel
+itself are drawn after the rest, where the rest has left a mark: on a CPU every pixel pays for all that a
+shader can do.
+
 What a scene does not have costs nothing: a program is compiled for each combination of lens, layers, area
 lights, glass and mirror that occurs.
 """
@@ -52,16 +56,31 @@ class ShadePass:
         targets.begin_shading()
         if mirror is not None:
             mirror.use_mirror(11)
-        program = self._program(shot.lens.model, stage, GLASS=0, PLANAR=int(mirror is not None))
-        set_uniforms(program, block_lights=targets.block_lights, shining=float(shining))
-        self._shade(program, targets, stage, buffers, shot, layers)
+        context, planar = self._context, int(mirror is not None)
+
+        def draw_part(own: int) -> None:
+            program = self._program(shot.lens.model, stage, GLASS=0, PLANAR=planar, OWN=own)
+            set_uniforms(program, block_lights=targets.block_lights, shining=float(shining))
+            self._shade(program, targets, stage, buffers, shot, layers)
+
+        context.enable_only(moderngl.DEPTH_TEST)
+        context.depth_func = "1"  # always: what is drawn is a mark
+        draw_part(0)
+        targets.begin_missing()
+        context.enable(moderngl.BLEND)
+        context.blend_func = moderngl.ONE, moderngl.ONE
+        context.depth_func = ">"
+        draw_part(1)
+        context.depth_func = "<"
+        context.enable_only(moderngl.NOTHING)
 
     def draw_glass(
         self, targets: Targets, stage: Stage, buffers: Buffers, shot: Shot, layers: LayerStore
     ) -> None:
         """Glass over the result so far."""
+        self._context.enable_only(moderngl.NOTHING)
         targets.begin_glass(_places(stage.geometry.spheres[stage.glass], shot, targets.size))
-        program = self._program(shot.lens.model, stage, GLASS=1, PLANAR=0)
+        program = self._program(shot.lens.model, stage, GLASS=1, PLANAR=0, OWN=2)
         set_uniforms(program, block_lights=0, shining=1.0)
         self._shade(program, targets, stage, buffers, shot, layers)
         targets.end_glass()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import moderngl
@@ -36,7 +36,7 @@ class ShadowAtlas:
         self._moments = self._context.texture((size[0] // 2, size[1] // 2), 2, dtype="f4")
         self._moments.build_mipmaps()
         self.framebuffer = self._context.framebuffer([], self._depth)
-        self._to_moments = self._context.framebuffer([self._moments])
+        self._to_moments: Any = self._context.framebuffer([self._moments])
         self._owned = [self.framebuffer, self._to_moments, self._depth, self._moments]
         self._size = size
 
@@ -46,13 +46,16 @@ class ShadowAtlas:
         self.framebuffer.viewport = (0, 0, *self._size)
         self.framebuffer.clear(depth=1.0)
 
-    def begin_moments(self) -> None:
-        """Draw the moments; unit 0 holds the depth."""
+    def draw_moments(
+        self, corners: Sequence[tuple[int, int]], tile_px: int, draw_screen: Callable[[], None]
+    ) -> None:
+        """The moments of tiles, with mip levels, from the depth, which unit 0 holds."""
         self._depth.use(0)
-        self._to_moments.use()
-
-    def end_moments(self) -> None:
-        """Average them into mip levels."""
+        for x, y in corners:
+            self._to_moments.scissor = (x // 2, y // 2, tile_px // 2, tile_px // 2)
+            self._to_moments.use()
+            draw_screen()
+        self._to_moments.scissor = None
         self._moments.build_mipmaps()
 
     def use(self, compare_unit: int, moments_unit: int) -> None:

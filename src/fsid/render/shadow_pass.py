@@ -45,7 +45,7 @@ class ShadowPass:
         self._atlas.resize(plan.size)
 
     def draw(self, stage: Stage, buffers: Buffers, shots: Sequence[Shot]) -> None:
-        """The tiles that any of the shots can see, and the moments of all."""
+        """The tiles that any of the shots can see, and their moments."""
         geometry, lens = stage.geometry, shots[0].lens
         centres, radii = geometry.spheres[:, :3], geometry.spheres[:, 3]
         deepest = float((np.linalg.norm(centres - lens.position, axis=1) + radii).max())
@@ -54,9 +54,8 @@ class ShadowPass:
         self._atlas.begin()
         array = buffers.vertex_array(self._depth)
         set_uniforms(self._depth, near=NEAR_M)
-        for tile in stage.plan.tiles:
-            if not any(sees(shot, tile, deepest) for shot in shots):
-                continue
+        seen = [tile for tile in stage.plan.tiles if any(sees(shot, tile, deepest) for shot in shots)]
+        for tile in seen:
             self._atlas.framebuffer.viewport = (*tile.corner, stage.plan.tile_px, stage.plan.tile_px)
             set_uniforms(
                 self._depth,
@@ -67,9 +66,9 @@ class ShadowPass:
             )
             buffers.draw(array, draw_commands(geometry.ranges, _casters(stage, tile)))
         self._context.enable_only(moderngl.NOTHING)
-        self._atlas.begin_moments()
-        buffers.draw_screen(self._moments)
-        self._atlas.end_moments()
+        self._atlas.draw_moments(
+            [tile.corner for tile in seen], stage.plan.tile_px, lambda: buffers.draw_screen(self._moments)
+        )
 
     def draw_blocks(self, targets: Targets, stage: Stage, buffers: Buffers, shot: Shot) -> None:
         """What reaches the blocks of an image whose G-buffer is drawn."""
@@ -78,6 +77,7 @@ class ShadowPass:
             self._blocks,
             blocks=targets.blocks,
             through=stage.has_lobes,
+            light_count=stage.plan.light_count,
             seen=targets.seen,
             seen_focal=lens.seen_focal,
             seen_shift=shot.seen_shift,

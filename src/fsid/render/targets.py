@@ -51,9 +51,11 @@ class Targets:
         self._samples = context.texture(large, 4, dtype="u4")
         self._depth = context.depth_texture(large)
         self._depth.compare_func = ""
-        self._block_depth = context.texture(self.blocks, 1, dtype="f4")
-        self._open, self._blurred = (context.texture(self.blocks, 2, dtype="f4") for _ in range(2))
-        self._results = [self._result()]
+        self._block_depth = context.texture(self.blocks, 2, dtype="f4")
+        self._open, self._blurred = (context.texture(self.blocks, n, dtype="f4") for n in (3, 2))
+        self._marks = context.depth_renderbuffer(size)
+        self._results = [self._result(self._marks)]
+        self._missing = [context.framebuffer([self._results[0][1]], self._marks)]
         images = [self._samples, self._depth, self._block_depth, self._open, self._blurred]
         for texture in images:
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
@@ -62,7 +64,7 @@ class Targets:
         self._to_open = context.framebuffer([self._open])
         self._to_blurred = context.framebuffer([self._blurred])
         framebuffers = [self._to_samples, self._to_block_depth, self._to_open, self._to_blurred]
-        self._owned = [*framebuffers, *images]
+        self._owned = [*framebuffers, *self._missing, self._marks, *images]
 
     def begin_samples(self, *, over: bool) -> None:
         """Draw the G-buffer, from nothing; or only what lies in front of the depth that is there."""
@@ -80,11 +82,12 @@ class Targets:
         """Draw the share of each light that reaches the blocks, of as many lights as an image is high; unit
         0 holds the G-buffer, and unit 15 is the result for what is drawn next."""
         width, height = self.blocks
-        self.block_lights = min(lights, self._limit // height)
-        rows = max(self.block_lights, 1) * height
+        fours = min(-(-lights // 4), self._limit // height)
+        self.block_lights = min(lights, 4 * fours)
+        rows = max(fours, 1) * height
         if rows != self._lit_rows:
             self._release_lit()
-            texture = self._context.texture((width, rows), 1, dtype="f4")
+            texture = self._context.texture((width, rows), 4, dtype="f4")
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
             self._lit, self._lit_rows = [self._context.framebuffer([texture]), texture], rows
         self._lit[1].use(15)
@@ -112,6 +115,10 @@ class Targets:
         self._samples.use(8)
         self._open.use(9)
         self._drawn = (self._results[0], [(0, 0, *self.size)])
+
+    def begin_missing(self) -> None:
+        """Draw the radiance alone, once more; the depth marks the pixels that lack some."""
+        self._drawn = (self._missing, [(0, 0, *self.size)])
 
     def use_mirror(self, unit: int) -> None:
         """Bind radiance and depth, with mip levels, for what reflects them."""
@@ -147,7 +154,8 @@ class Targets:
         width, height = self.size
         radiance, depth = np.empty((height, width, 3), np.float32), np.empty((height, width), np.float32)
         for rows, texels in self._strips(0, "f4", np.float32):
-            radiance[rows], depth[rows] = texels[..., :3], texels[..., 3]
+            _fill(radiance[rows], texels, 1.0)
+            depth[rows] = texels[..., 3]
         depth[depth <= 0] = np.inf
         return radiance, depth
 
@@ -159,10 +167,11 @@ class Targets:
         object_id = np.empty((height, width), np.int32)
         if labels:
             for rows, texels in self._strips(1, "nu2", np.uint16):
-                albedo[rows] = texels[..., :3] * np.float32(1 / _ID_LEVELS)
-                object_id[rows] = texels[..., 3].astype(np.int32) - 1
+                _fill(albedo[rows], texels, 1 / _ID_LEVELS)
+                np.subtract(texels[..., 3], 1, out=object_id[rows], dtype=np.int32)
             for rows, texels in self._strips(2, "nu2", np.uint16):
-                normal[rows] = texels[..., :3] * np.float32(2 / _ID_LEVELS) - 1
+                _fill(normal[rows], texels, 2 / _ID_LEVELS)
+                normal[rows] -= 1
         return Frame(radiance, albedo, normal, depth, object_id)
 
     def _strips(self, image: int, dtype: str, kind: type) -> Iterator[tuple[slice, np.ndarray]]:
@@ -190,11 +199,17 @@ class Targets:
         self._release_lit()
         self.size = self.seen = (0, 0)
 
-    def _result(self) -> list[Any]:
-        """A framebuffer and its images: radiance and depth; albedo and object id; normal."""
+    def _result(self, marks: Any = None) -> list[Any]:
+        """A framebuffer and its images: radiance and depth; albedo and id; normal. marks: its depth."""
         radiance = self._context.texture(self.size, 4, dtype="f4")
         labels = [self._context.texture(self.size, 4, dtype="nu2") for _ in range(2)]
         radiance.repeat_x = radiance.repeat_y = False
         for label in labels:
             label.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        return [self._context.framebuffer([radiance, *labels]), radiance, *labels]
+        return [self._context.framebuffer([radiance, *labels], marks), radiance, *labels]
+
+
+def _fill(image: np.ndarray, texels: np.ndarray, scale: float) -> None:
+    """Colours of texels into an image, one by one: numpy takes four times as long for all at once."""
+    for k in range(3):
+        np.multiply(texels[..., k], np.float32(scale), out=image[..., k])

@@ -1,13 +1,17 @@
 // What blocks of 2 x 2 pixels know, between their samples: openness (occlusion.frag), light (shadow_blocks.frag).
-layout(binding = 9) uniform sampler2D occlusion;
+layout(binding = 9) uniform sampler2D occlusion;     // openness, depth, surface from 1
 layout(binding = 15) uniform sampler2D lit_blocks;   // of shadow_blocks.frag
 uniform int block_lights;   // how many lights it holds
+
+const float LEAST_OWN = 0.3;   // share of the blocks around a point that must lie on its surface
 
 // The four blocks of 2 x 2 pixels around a point.
 struct Blocks {
     ivec2 at[4];
+    float open[4], depth[4];
     float share[4];     // bilinear
-    bool even;          // whether their samples lie on the point's own surface
+    float own[4];       // the same among those whose samples lie on the point's own surface; 0 if too few do
+    bool even;          // whether all do
 };
 
 Blocks blocks_around(Sample p) {
@@ -22,13 +26,18 @@ Blocks blocks_around(Sample p) {
         vec2 near = mix(1.0 - f, f, vec2(cell));
         b.share[i] = near.x * near.y;
         b.at[i] = clamp(corner + cell, ivec2(0), last);
-        ivec2 texel = block_texel(b.at[i]);
-        uvec4 code = texelFetch(samples, texel, 0);
-        vec3 position = seen_ray((vec2(texel) + 0.5) / float(GRID)) * uintBitsToFloat(code.w) * axes + origin;
-        b.even = b.even && int(code.z) - 1 == p.surface
-            && dot(unpack_direction(code.y), p.face_normal) > MIN_FACE_COSINE
+        vec3 known = texelFetch(occlusion, b.at[i], 0).rgb;
+        vec2 place = (vec2(block_texel(b.at[i])) + 0.5) / float(GRID);
+        vec3 position = seen_ray(place) * known.y * axes + origin;
+        b.open[i] = known.x;
+        b.depth[i] = known.y;
+        bool own = int(known.z) - 1 == p.surface
             && abs(dot(position - p.position, p.face_normal)) < PLANE_TOLERANCE * p.depth;
+        b.own[i] = own ? b.share[i] : 0.0;
+        b.even = b.even && own;
     }
+    float total = b.own[0] + b.own[1] + b.own[2] + b.own[3];
+    for (int i = 0; i < 4; ++i) b.own[i] = total > LEAST_OWN ? b.own[i] / total : 0.0;
     return b;
 }
 
@@ -36,23 +45,23 @@ Blocks blocks_around(Sample p) {
 float openness(Blocks b, float depth) {
     float sum = 0.0, total = 0.0;
     for (int i = 0; i < 4; ++i) {
-        vec2 o = texelFetch(occlusion, b.at[i], 0).xy;
-        float d = b.even ? 0.0 : (o.y - depth) / (0.02 * depth);
+        float d = b.even ? 0.0 : (b.depth[i] - depth) / (0.02 * depth);
         float w = (b.share[i] + 1e-3) / (1e-3 + d * d);
-        sum += w * o.x;
+        sum += w * b.open[i];
         total += w;
     }
     return sum / total;
 }
 
-// Share of a light that arrives, between the blocks' samples; more than 1 where that must be found here.
-float interpolated(Blocks b, int light) {
-    int row = light * textureSize(occlusion, 0).y;
-    float sum = 0.0, most = b.even && light < block_lights ? 0.0 : 2.0;
+// Shares of four lights that arrive, between the blocks' samples; more than 1 where that must be found here.
+vec4 interpolated(Blocks b, int four) {
+    int row = four * textureSize(occlusion, 0).y;
+    bool any = b.own[0] + b.own[1] + b.own[2] + b.own[3] > 0.5;
+    vec4 sum = vec4(0), most = vec4(any && 4 * four < block_lights ? 0.0 : 2.0);
     for (int i = 0; i < 4; ++i) {
-        float lit = texelFetch(lit_blocks, b.at[i] + ivec2(0, row), 0).r;
-        sum += b.share[i] * lit;
-        most = max(most, lit);
+        vec4 lit = texelFetch(lit_blocks, b.at[i] + ivec2(0, row), 0);
+        sum += b.own[i] * lit;
+        most = max(most, b.own[i] > 0.0 ? lit : vec4(0));
     }
-    return most > 1.0 ? 2.0 : sum;
+    return mix(sum, vec4(2), greaterThan(most, vec4(1)));
 }

@@ -1,9 +1,10 @@
 #version 430 core
-// Openness (r) averaged along one image axis with binomial weights, among pixels of like depth (g).
+// Openness (r) averaged along one image axis with binomial weights, among pixels of like depth (g). b: surface.
 layout(binding = 0) uniform sampler2D openness;
+layout(binding = 1) uniform sampler2D blocks;   // of block_depth.frag
 uniform ivec2 direction;
 uniform ivec2 size;
-layout(location = 0) out vec2 result;
+layout(location = 0) out vec3 result;
 
 const int REACH = 5;
 const float WEIGHTS[REACH + 1] = float[](252.0, 210.0, 120.0, 45.0, 10.0, 1.0);
@@ -20,5 +21,5 @@ void main() {
         sum += weight * o.x;
         total += weight;
     }
-    result = vec2(sum / total, centre.y);
+    result = vec3(sum / total, centre.y, texelFetch(blocks, pixel, 0).g);
 }

@@ -4,7 +4,8 @@
 // inside a surface is one such group, one at an edge two or three. Output: the frame at its final size.
 // GRID: edge of the square of samples per pixel. LOBES: 1 with clearcoat, sheen and translucency. AREAS: 1 with
 // area lights. GLASS: 1 in the second pass, whose samples are glass alone and which looks what is behind up in
-// the result of the first. PLANAR: 1 with an image of the scene as smooth ground in z = 0 reflects it.
+// the result of the first. OWN: 0 leaves lights out whose shadow is not interpolated and marks the pixel in depth, 1
+// adds those lights alone, 2 is both at once. PLANAR: 1 with an image of the scene as smooth ground in z = 0 reflects it.
 #include "encoding.glsl"
 #include "surfaces.glsl"
 #include "material.glsl"
@@ -28,31 +29,41 @@ layout(binding = 12) uniform sampler2D behind_albedo;   // as out_albedo
 layout(binding = 13) uniform sampler2D behind_normal;   // as out_normal
 #endif
 layout(location = 0) out vec4 out_radiance;   // a: depth in metres, 0 where nothing was hit
+#if OWN != 1
 layout(location = 1) out vec4 out_albedo;     // a: (object id + 1) / 65535
 layout(location = 2) out vec4 out_normal;     // camera space, 0.5 + 0.5 n
+#endif
 
 // Light of all lights. First those whose shadow is interpolated; the others need their own, which costs much
 // more, one after the other: lights differ from pixel to pixel in that loop, so that it is short.
-vec3 lights_on(Sample p, Reflector b, Blocks blocks) {
+// missing: whether some were left out.
+vec3 lights_on(Sample p, Reflector b, Blocks blocks, inout bool missing) {
     vec3 sum = vec3(0);
     int i = 0;
     do {
         int first = i;
         uint left = 0u;
         do {
-            vec3 light = returned(light_at(i), p, b);
-            bool wanted = i < light_count && max(light.r, max(light.g, light.b)) > 0.0;
-            float lit = interpolated(blocks, i);
-            left |= wanted && lit > 1.0 ? 1u << (i - first) : 0u;
-            sum += wanted && lit <= 1.0 ? lit * light : vec3(0);
-        } while (++i < min(light_count, first + 32));
+            vec4 four = interpolated(blocks, i / 4);
+            do {
+                vec3 light = returned(light_at(i), p, b);
+                bool wanted = i < light_count && max(light.r, max(light.g, light.b)) > 0.0;
+                float lit = four[i & 3];
+                left |= wanted && lit > 1.0 ? 1u << (i - first) : 0u;
+                sum += OWN != 1 && wanted && lit <= 1.0 ? lit * light : vec3(0);
+            } while ((++i & 3) != 0 && i < light_count);
+        } while (i < min(light_count, first + 32));
+        missing = missing || left != 0u;
+#if OWN
         do {
             bool wanted = left != 0u;
             Light light = light_at(first + (wanted ? findLSB(left) : 0));
-            float even_m, lit = visibility(light, p.position, p.face_normal, wanted, even_m);
+            bool even;
+            float lit = visibility(light, p.position, p.face_normal, wanted, 0.0, even);
             sum += wanted ? lit * returned(light, p, b) : vec3(0);
             left &= left - 1u;
         } while (left != 0u);
+#endif
     } while (i < light_count);
     return sum;
 }
@@ -85,15 +96,19 @@ vec3 surroundings_in(Sample p, vec3 r, float alpha) {
     return room;
 }
 
-vec3 radiance(Sample p, Surface s, Matter m, float spread) {
+vec3 radiance(Sample p, Surface s, Matter m, float spread, inout bool missing) {
     Reflector b = reflector_of(p, s, m, spread);
     Blocks blocks = blocks_around(p);
+    vec3 light = lights_on(p, b, blocks, missing);
+#if OWN == 1
+    return light;
+#endif
     vec3 surroundings = cube(ambient_sides, b.n) * b.diffuse + b.mirror * surroundings_in(p, b.r, b.alpha);
 #if LOBES
     surroundings = surroundings * b.below + b.coat * surroundings_in(p, b.r, b.coat_alpha)
                  + b.cloth * cube(ambient_sides, b.n) + b.through * cube(ambient_sides, -b.n);
 #endif
-    vec3 result = lights_on(p, b, blocks) + openness(blocks, p.depth) * surroundings;
+    vec3 result = light + openness(blocks, p.depth) * surroundings;
 #if GLASS
     float mirror = b.mirror.g / b.rebound.g;
     float passes = s.transmission * (1.0 - m.metallic) * (1.0 - mirror) * (1.0 - mirror);
@@ -130,6 +145,7 @@ void main() {
 #endif
     vec3 sum = vec3(0), albedo = vec3(0), relief = vec3(0);
     int id = 0;
+    bool missing = false;
     float covered = 0.0;
     do {
         uint before = open;
@@ -143,13 +159,15 @@ void main() {
         bool front = dot(smooth_normal, p.face_normal) > 0.0;
         vec3 turned = front ? smooth_normal : -smooth_normal;
         m.normal = front ? m.normal : -m.normal;
-        vec3 light = radiance(p, s, m, spread);
-        light += shining * (s.emission * m.albedo + (front ? s.glow : vec3(0)));
+        bool part = false;
+        vec3 light = radiance(p, s, m, spread, part);
+        missing = missing || part && hit;
+        light += OWN == 1 ? vec3(0) : shining * (s.emission * m.albedo + (front ? s.glow : vec3(0)));
 #if GLASS
         covered += hit ? members : 0.0;
         sum += hit ? members * light : vec3(0);
 #else
-        sum += members * (hit ? light : sky_at(ray));
+        sum += members * (hit ? light : OWN == 1 ? vec3(0) : sky_at(ray));
 #endif
         albedo += hit ? members * m.albedo : vec3(0);
         bool labels = ((before & ~open) & (1u << MIDDLE)) != 0u && hit;
@@ -160,6 +178,9 @@ void main() {
     vec2 corner = (vec2(pixel) + 0.5) / vec2(size) * 2.0 - 1.0;
     float r2 = dot(corner, corner * vec2(size * size)) / dot(vec2(size), vec2(size));
     float gain = max(1.0 + r2 * (vignetting.x + r2 * (vignetting.y + r2 * vignetting.z)), 0.0);
+#if OWN == 1
+    out_radiance = vec4(sum * (gain / float(COUNT)), 0.0);
+#else
     out_radiance = vec4(sum * (gain / float(COUNT)), label.surface >= 0 ? label.depth : 0.0);
     out_albedo = vec4(albedo / float(COUNT), float(id) / 65535.0);
     vec3 normal = dot(label.normal, label.face_normal) < 0.0 ? -label.normal : label.normal;
@@ -175,5 +196,9 @@ void main() {
         out_albedo.a = far_albedo.a;
         out_normal = texelFetch(behind_normal, pixel, 0);
     }
+#endif
+#if OWN == 0
+    gl_FragDepth = missing ? 0.0 : 1.0;
+#endif
 #endif
 }

@@ -1,6 +1,6 @@
 #version 430 core
 // Share of each light that reaches one sample per block of 2 x 2 pixels, for shade.frag to interpolate where it
-// varies smoothly: light after light from top to bottom, blocks.y rows each. 2: not smooth enough for that.
+// varies smoothly: four lights a texel, the next four below, blocks.y rows each. 2: not smooth enough for that.
 #include "encoding.glsl"
 #include "lights.glsl"
 #include "shadows.glsl"
@@ -10,13 +10,12 @@ uniform ivec2 blocks;
 uniform bool through;     // whether there are surfaces that pass light on
 uniform mat3 axes;        // rows right, up, forward
 uniform vec3 origin;
-layout(location = 0) out float result;
+layout(location = 0) out vec4 result;
 
 const float SLANTED = 0.05;   // cosine below which a surface is not followed further
 
 void main() {
     ivec2 at = ivec2(gl_FragCoord.xy);
-    Light light = light_at(at.y / blocks.y);
     ivec2 texel = block_texel(ivec2(at.x, at.y % blocks.y));
     uvec4 code = texelFetch(samples, texel, 0);
     vec3 ray = seen_ray((vec2(texel) + 0.5) / float(GRID)) * axes;
@@ -25,12 +24,16 @@ void main() {
     vec3 position = ray * depth + origin;
     float slant = max(abs(dot(n, ray)) / length(ray), SLANTED);
     float block_m = depth * length(4.0 / (seen_focal * vec2(seen))) / slant;
-    vec3 to_light = light.kind == SUN ? -light.direction : light.position - position;
-    float distance_m = max(length(to_light), 1e-6);
-    bool reached = light.kind == AREA ? dot(to_light, light.direction) < 0.0
-        : any(greaterThan(arriving(light, to_light / distance_m, distance_m), vec3(0)));
-    bool wanted = code.z > 0u && reached && (through || dot(n, to_light) > -0.15 * distance_m);
-    float even_m;
-    float lit = visibility(light, position, n, wanted, even_m);
-    result = even_m < block_m ? 2.0 : lit;
+    int first = 4 * (at.y / blocks.y), i = 0;
+    result = vec4(0);
+    do {
+        Light light = light_at(first + i);
+        vec3 to_light = light.kind == SUN ? -light.direction : light.position - position;
+        float distance_m = max(length(to_light), 1e-6);
+        bool reached = light.kind == AREA ? dot(to_light, light.direction) < 0.0
+            : any(greaterThan(arriving(light, to_light / distance_m, distance_m), vec3(0)));
+        bool even, wanted = code.z > 0u && reached && (through || dot(n, to_light) > -0.15 * distance_m);
+        float lit = visibility(light, position, n, wanted, block_m, even);
+        result[i] = even ? lit : 2.0;
+    } while (++i < min(4, light_count - first));
 }

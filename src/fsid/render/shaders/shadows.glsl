@@ -71,51 +71,57 @@ Receiver receiver_of(Light light, vec3 d, vec3 n) {
     return r;
 }
 
-// Light that reaches the receiver's plane at `offset` past what the shadow map holds within `width` of there
-// (both tile units), by Chebyshev's inequality (Donnelly and Lauritzen 2006); exact for one occluder
-// in front of the plane. blocked: summed u of the occluders (Yang et al. 2010).
-float soft_tap(Receiver r, vec2 offset, float width, out float blocked) {
+// What the shadow map holds within `width` of a place on the receiver's plane, and the plane itself there.
+struct Field {
+    vec2 moments;          // means of u and u^2
+    float limit;           // u of the plane
+};
+
+Field field_at(Receiver r, vec2 offset, float width) {
     vec2 inside = r.to_atlas * min(width, 0.5 * r.tile_size);
     vec2 uv = clamp(r.centre + r.to_atlas * offset, r.corner + inside, r.corner + r.to_atlas * r.tile_size - inside);
-    float level = log2(max(width / (2.0 * r.texel), 1.0));
-    vec2 moments = textureLod(shadow_moments, uv, level).xy;
-    float limit = r.u + dot(r.slope, (uv - r.centre) / r.to_atlas);
-    float in_front = max(moments.x - limit - r.bias, 0.0);
-    float variance = max(moments.y - moments.x * moments.x, 0.0);
+    vec2 moments = textureLod(shadow_moments, uv, log2(max(width / (2.0 * r.texel), 1.0))).xy;
+    return Field(moments, r.u + dot(r.slope, (uv - r.centre) / r.to_atlas));
+}
+
+// Light that reaches the plane past that, by Chebyshev's inequality (Donnelly and Lauritzen 2006); exact for one
+// occluder in front of the plane. blocked: summed u of the occluders (Yang et al. 2010).
+float soft_lit(Receiver r, Field f, out float blocked) {
+    float in_front = max(f.moments.x - f.limit - r.bias, 0.0);
+    float variance = max(f.moments.y - f.moments.x * f.moments.x, 0.0);
     float lit = in_front > 0.0 ? variance / (variance + in_front * in_front) : 1.0;
-    blocked = moments.x - lit * limit;
+    blocked = f.moments.x - lit * f.limit;
     return lit;
 }
 
-// Is there nothing but the receiver's own plane within `width`? Then no light is lost.
-bool alone(Receiver r, float width) {
-    vec2 inside = r.to_atlas * min(width, 0.5 * r.tile_size);
-    vec2 uv = clamp(r.centre, r.corner + inside, r.corner + r.to_atlas * r.tile_size - inside);
-    vec2 moments = textureLod(shadow_moments, uv, log2(max(width / (2.0 * r.texel), 1.0))).xy;
-    float limit = r.u + dot(r.slope, (uv - r.centre) / r.to_atlas);
-    float variance = moments.y - moments.x * moments.x;
+// Is there nothing but the receiver's own plane? Then no light is lost.
+bool alone(Receiver r, Field f, float width) {
+    float variance = f.moments.y - f.moments.x * f.moments.x;
     float own = dot(r.slope, r.slope) * width * width;
-    return abs(moments.x - limit) < 0.3 * r.bias && variance < own + r.bias * r.bias;
+    return abs(f.moments.x - f.limit) < 0.3 * r.bias && variance < own + r.bias * r.bias;
 }
 
 // Share of the light seen from `position`: soft shadows by the mean depth of what is in the way
 // (Fernando 2005), with fixed taps that are areas and not points, so that they leave no pattern; where the
-// penumbra is a few texels, a percentage-closer filter on the depth itself. wanted: false asks nothing.
-// even_m: how far from here, in metres, the result is as smooth as its filter makes it.
-float visibility(Light light, vec3 position, vec3 face_normal, bool wanted, out float even_m) {
+// penumbra is a few texels, a percentage-closer filter on the depth itself. Where all that the penumbra can
+// reach is of one kind, nothing is filtered. wanted: false asks nothing.
+// even: whether the result is as smooth as the receiver within around_m metres.
+float visibility(Light light, vec3 position, vec3 face_normal, bool wanted, float around_m, out bool even) {
     Receiver r = receiver_of(light, position - light.position, face_normal);
-    float shaded = 0.0, blocked_sum = 0.0, blocked;
-    int taps = wanted && r.inside && !alone(r, 1.2 * r.search) ? search_taps : 0;
+    float shaded = 0.0, blocked_sum = 0.0, blocked, farthest = 1.2 * r.search;
+    Field all = field_at(r, vec2(0), farthest);
+    bool asked = wanted && r.inside, closed = asked && soft_lit(r, all, blocked) < 1.0 - DARK;
+    int taps = asked && !closed && !alone(r, all, farthest) ? search_taps : 0;
     mat2 search = r.spread * (r.search / max(max(length(r.spread[0]), length(r.spread[1])), 1e-12));
     float width = 0.3 * r.search;
     int i = 0;
     do {
         vec2 offset = search * texelFetch(tap_table, ivec2(i, 0), 0).xy;
-        float lit = soft_tap(r, offset, width, blocked);
+        float lit = soft_lit(r, field_at(r, offset, width), blocked);
         shaded += i < taps ? 1.0 - lit : 0.0;
         blocked_sum += i < taps ? blocked : 0.0;
     } while (++i < taps);
-    bool dark = shaded > DARK * float(search_taps);
+    bool dark = closed || shaded > DARK * float(search_taps);
     bool mixed = shaded >= TRACE && !dark;
     float nearer = max(blocked_sum / max(shaded, TRACE) - r.u, 0.0);
     mat2 spread = r.spread * nearer;
@@ -124,27 +130,35 @@ float visibility(Light light, vec3 position, vec3 face_normal, bool wanted, out 
     spread = size > 1e-12 ? spread * (wide / size) : mat2(wide);
     float soft = smoothstep(SHARP_TEXELS, SOFT_TEXELS, wide / r.texel);
 
-    float sharp_lit = 0.0, bias = r.bias + (abs(r.slope.x) + abs(r.slope.y)) * r.texel;
-    int sharp = mixed && soft < 1.0 ? filter_taps : 0;
+    float around = around_m * (light.kind == SUN ? 1.0 : r.u / SHADOW_NEAR);
+    float reach = max(1.2 * wide, 1.5 * around);   // to the corners of a block
+    Field field = field_at(r, vec2(0), reach);
+    float passed = soft_lit(r, field, blocked);
+    bool full = passed < 1.0 - DARK, settled = full || alone(r, field, reach), filtered = mixed && !settled;
+
+    float sharp_sum = 0.0, bias = r.bias + (abs(r.slope.x) + abs(r.slope.y)) * r.texel;
+    int sharp = filtered && soft < 1.0 ? filter_taps : 0;
     i = 0;
     do {
         vec2 offset = spread * texelFetch(tap_table, ivec2(i, 1), 0).xy;
         float limit = r.u + dot(r.slope, offset) + bias;
-        sharp_lit += textureLod(shadow_compare, vec3(r.centre + r.to_atlas * offset, 1.0 - limit), 0.0);
+        sharp_sum += textureLod(shadow_compare, vec3(r.centre + r.to_atlas * offset, 1.0 - limit), 0.0);
     } while (++i < sharp);
-    float soft_lit = 0.0;
-    int smooth_taps = mixed && soft > 0.0 ? filter_taps : 0;
+    float soft_sum = 0.0;
+    int smooth_taps = filtered && soft > 0.0 ? filter_taps : 0;
     i = 0;
     do {
         vec2 offset = spread * texelFetch(tap_table, ivec2(i, 1), 0).xy;
-        soft_lit += soft_tap(r, offset, 0.3 * wide, blocked);
+        soft_sum += soft_lit(r, field_at(r, offset, 0.3 * wide), blocked);
     } while (++i < smooth_taps);
-    soft_lit /= float(filter_taps);
-    float dim = 1.0 - soft_lit;
-    soft_lit = max(soft_lit - LEAK * dim * dim * dim, 0.0);
-    float lit = mix(sharp_lit / float(filter_taps), soft_lit, soft);
+    float dim = 1.0 - soft_sum / float(filter_taps);
+    float smoothed = max(1.0 - dim - LEAK * dim * dim * dim, 0.0);
+    float lit = mix(sharp_sum / float(filter_taps), smoothed, soft);
     lit = mix(1.0, lit, smoothstep(TRACE, BEGUN, shaded));
-    float even = r.inside ? mixed ? 0.5 * (wide + r.texel) : taps > 0 ? r.search : 1.2 * r.search : 1e9;
-    even_m = wanted ? even * (light.kind == SUN ? 1.0 : SHADOW_NEAR / r.u) : 0.0;
-    return mixed ? lit : dark ? 0.0 : 1.0;
+    lit = filtered ? lit : dark || mixed && full ? 0.0 : 1.0;
+
+    float followed = mixed ? 0.5 * (wide + r.texel) : taps > 0 ? r.search : farthest;
+    bool same = mixed && (settled || lit >= 1.0 && passed >= 1.0);
+    even = !wanted || !r.inside || followed >= around || same;
+    return lit;
 }
