@@ -35,11 +35,12 @@ QUALITIES = {
 
 
 def tap_table(quality: Quality) -> np.ndarray:
-    """(3, N, 2) float32 points of the unit disc: search, filter, occlusion; the rest of a row is unused."""
+    """(3, N, 2) float32 points of the unit disc: search, filter, where the spirals of occlusion begin; the
+    rest of a row is unused."""
     rows = (
         spiral(quality.search_taps),
         spiral(quality.filter_taps),
-        woven_spirals(quality.occlusion_taps),
+        first_of_woven(quality.occlusion_taps),
     )
     table = np.zeros((3, max(len(row) for row in rows), 2), np.float32)
     for target, row in zip(table, rows, strict=True):
@@ -54,10 +55,10 @@ def spiral(count: int) -> np.ndarray:
     return np.asarray(points - points.mean(0))
 
 
-def woven_spirals(count: int) -> np.ndarray:
-    """(4 * count, 2) points of the unit disc, radius ~ index: every fourth belongs to the same spiral, all
-    together are one."""
-    i = np.arange(4 * count)
+def first_of_woven(count: int) -> np.ndarray:
+    """(4, 2) first points of four spirals of `count` points each, radius ~ index, that together are one;
+    in the unit disc. shaders/occlusion.frag goes on from them."""
+    i = np.arange(4)
     return _polar((i + 0.5) / (4 * count), i * _GOLDEN_ANGLE)
 
 

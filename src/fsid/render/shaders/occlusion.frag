@@ -20,20 +20,20 @@ const float MAX_SCREEN = 0.2;   // of the image width
 const float GOLDEN_ANGLE = 2.3999632;
 const vec2 TURN = vec2(cos(4.0 * GOLDEN_ANGLE), sin(4.0 * GOLDEN_ANGLE));   // from a tap to the next of its spiral
 
-// Points (x right, y down, 1) of the image plane at distance 1: first * block + second.
-void image_plane(out vec2 first, out vec2 second) {
+// Where the ray of a block meets the plane 1 m ahead (x right, y up): block * per_block + corner.
+void plane_ahead(out vec2 per_block, out vec2 corner) {
     vec2 flip = vec2(1, -1) / focal, all = vec2(size * stride);
-    first = flip * (2.0 * float(stride) / all);
-    second = flip * ((2.0 * float(stride / 2) + 1.0) / all - 1.0 - shift);
+    per_block = flip * (2.0 * float(stride) / all);
+    corner = flip * ((2.0 * float(stride / 2) + 1.0) / all - 1.0 - shift);
 }
 
 void main() {
     ivec2 block = ivec2(gl_FragCoord.xy);
-    vec2 first, second;
-    image_plane(first, second);
+    vec2 per_block, corner;
+    plane_ahead(per_block, corner);
     float z = texelFetch(depth, block, 0).r;
     bool hit = z > 0.0;
-    vec3 p = vec3(vec2(block) * first + second, 1.0) * z;
+    vec3 p = vec3(vec2(block) * per_block + corner, 1.0) * z;
     vec3 n = axes * unpack_direction(texelFetch(samples, block * stride + stride / 2, 0).y);
     float reach = min(0.5 * RADIUS_M * focal.x / max(z, 1e-3), MAX_SCREEN) * float(size.x);
     float r2 = RADIUS_M * RADIUS_M, sum = 0.0;
@@ -48,7 +48,7 @@ void main() {
         direction = mat2(TURN.x, TURN.y, -TURN.y, TURN.x) * direction;
         radius += reach / float(taps);
         float other_z = texelFetch(depth, other, 0).r;
-        vec3 v = vec3(vec2(other) * first + second, 1.0) * other_z - p;
+        vec3 v = vec3(vec2(other) * per_block + corner, 1.0) * other_z - p;
         float vv = dot(v, v), f = max(r2 - vv, 0.0);
         sum += other_z > 0.0 ? f * f * f * max(dot(v, n) - floor_m, 0.0) / (vv + 0.0004) : 0.0;
     } while (++i < count);
