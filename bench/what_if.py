@@ -212,7 +212,7 @@ def _altered(batch: Batch, alter: Alteration) -> tuple[Tensor, Tensor]:
 
 def summed_db(better: np.ndarray, plain: np.ndarray, noise: np.ndarray) -> float:
     """How much less the summed error of patches is, dB: the mean over four equal parts of them by `noise`,
-    since PSNR is taken per level. better, plain: PSNR of every patch."""
+    since PSNR is taken per level. better, plain: (N,) PSNR of every patch, dB. noise: (N,) its k."""
     quarter = np.digitize(noise, np.quantile(noise, (0.25, 0.5, 0.75)))
     old, new = (np.bincount(quarter, 10 ** (-psnr / 10)) for psnr in (plain, better))
     return float((10 * np.log10(old / new)).mean())
@@ -249,9 +249,9 @@ def main() -> None:
             figures = []
             for better, before, noise in zip(results, plain, run.noise, strict=True):
                 more = better - before
-                error = more.std() / np.sqrt(len(more))
-                total = summed_db(better, before, noise)
-                figures.append(f"{more.mean():+.3f} ± {error:.3f}, {np.median(more):+.3f}, {total:+.3f}")
+                deviation = more.std() / np.sqrt(len(more))
+                mean, summed = f"{more.mean():+.3f} ± {deviation:.3f}", summed_db(better, before, noise)
+                figures.append(f"{mean}, {np.median(more):+.3f}, {summed:+.3f}")
             table.add_row(name, *figures)
     except FsidError as problem:
         parser.error(str(problem))
