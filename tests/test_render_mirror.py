@@ -1,4 +1,4 @@
-"""Smooth ground mirrors what stands on it: against a scene that really is there below it."""
+"""Flat smooth surfaces mirror what is before them: against a scene that really is seen from behind them."""
 
 from __future__ import annotations
 
@@ -7,13 +7,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import binary_erosion
 
+from fsid.assets.solids import rotation_matrix
 from fsid.render import Renderer
 from fsid.render.drawable import BACKGROUND_ID, Drawable, View
-from fsid.scene.model import Camera, Distortion, Transform
-from render_scenes import STILL, bake_plain, block, grid, lambertian, plain, point_light, view
+from fsid.render.frame import Frame
+from fsid.scene.model import Camera, Distortion, Transform, Vec3
+from render_scenes import STILL, bake_plain, block, grid, lambertian, plain, point_light, sphere, view
 
 ONE = (1.0, 1.0, 1.0)
+MIRROR_ID = 7
 ACROSS = Camera((0.0, -1.6, 0.7), (0.0, 0.2, 0.05), (0.0, 0.0, 1.0), 45.0, 160, 120)
 LIGHT = point_light((0.5, -1.2, 1.6), 3.0, 0.02)
 
@@ -22,6 +26,12 @@ LIGHT = point_light((0.5, -1.2, 1.6), 3.0, 0.02)
 def renderer() -> Iterator[Renderer]:
     with Renderer(texture_size=64) as renderer:
         yield renderer
+
+
+def plane_of(at: Transform) -> tuple[float, float, float, float]:
+    """Normal and offset of z = 0 of a thing at `at`."""
+    n = rotation_matrix(*at.rotation_deg)[:, 2]
+    return (*n, float(n @ at.position_m))
 
 
 def ground(roughness: int, **lobes: float) -> Drawable:
@@ -37,24 +47,82 @@ def things(*floor: Drawable, camera: Camera = ACROSS) -> View:
     return view(*floor, red, blue, lights=(LIGHT,), ambient=0.2, camera=camera)
 
 
-def test_a_mirror_shows_what_a_camera_below_it_sees(renderer: Renderer) -> None:
-    """Seen from M x along M R, without the floor, the things look as in the floor."""
-    frame = renderer.draw(things(ground(10)), bake=bake_plain)
-    x, y, z = ACROSS.position_m
-    below = replace(
-        ACROSS, position_m=(x, y, -z), target_m=(*ACROSS.target_m[:2], -ACROSS.target_m[2]), up=(0, 0, -1)
+def panel(at: Transform, roughness: int = 10, family: str = "metal", colour: Vec3 = ONE) -> Drawable:
+    """A flat thing of 1.2 m that looks up before it is turned."""
+    return Drawable(grid(1.2, 3), at, (plain(colour, roughness=roughness, family=family),), MIRROR_ID)
+
+
+WALL = Transform((0.0, 0.8, 0.5), (90.0, 0.0, 0.0), ONE)
+LEANING = Transform((0.5, 0.8, 0.4), (70.0, 0.0, -25.0), ONE)
+
+
+@pytest.mark.parametrize(
+    ("mirror", "plane"),
+    [
+        (ground(10), (0.0, 0.0, 1.0, 0.0)),
+        (panel(WALL), plane_of(WALL)),
+        (panel(LEANING), plane_of(LEANING)),
+    ],
+    ids=["ground", "wall", "leaning"],
+)
+def test_a_mirror_shows_what_a_camera_behind_it_sees(
+    renderer: Renderer, mirror: Drawable, plane: tuple[float, float, float, float]
+) -> None:
+    """Seen from M x along M R, without the mirror, the things look as in it."""
+    camera = replace(ACROSS, width=320, height=240)
+    frame = renderer.draw(things(mirror, camera=camera), bake=bake_plain)
+    n, d = np.array(plane[:3]), plane[3]
+    position, target, up = (
+        tuple(at - 2 * (np.dot(at, n) - offset) * n)
+        for at, offset in ((ACROSS.position_m, d), (ACROSS.target_m, d), (ACROSS.up, 0.0))
     )
-    direct = renderer.draw(things(camera=below), bake=bake_plain)
+    behind = replace(camera, position_m=position, target_m=target, up=up)
+    direct = renderer.draw(things(camera=behind), bake=bake_plain)
     shown = np.flip(direct.radiance, 1)  # a camera turned over sees left and right exchanged
-    there = np.flip(direct.object_id, 1) >= 0
-    floor = frame.object_id == BACKGROUND_ID
-    both = there & floor
+    inside = binary_erosion(np.flip(direct.object_id, 1) >= 0, iterations=6)  # an image is blurred
+    both = inside & (frame.object_id == mirror.object_id)
     assert both.sum() > 500
     ratio = frame.radiance[both].mean(-1) / shown[both].mean(-1)
     assert np.median(ratio) == pytest.approx(1.0, abs=0.05)
     red = both & (np.flip(direct.object_id, 1) == 0)
     colour = frame.radiance[red].mean(0)
     assert colour[0] > 3 * colour[1]
+
+
+def test_a_wall_mirror_and_the_ground_show_images_at_once(renderer: Renderer) -> None:
+    """The red block is seen in each of them, as often as in each alone."""
+    frame = renderer.draw(things(ground(10), panel(WALL)), bake=bake_plain)
+    for one, other in ((ground(10), panel(WALL, roughness=60)), (panel(WALL), ground(60))):
+        alone = renderer.draw(things(other, one), bake=bake_plain)
+        red, red_alone = (_red(image)[image.object_id == one.object_id].sum() for image in (frame, alone))
+        assert red_alone > 100
+        assert red == pytest.approx(red_alone, rel=0.1)
+
+
+def _red(frame: Frame) -> np.ndarray:
+    return np.asarray(frame.radiance[..., 0] > 2 * frame.radiance[..., 1])
+
+
+@pytest.mark.parametrize(
+    ("thing", "images"),
+    [
+        (panel(WALL), 1),
+        (panel(WALL, family="plain"), 0),  # 4 % of a tenth of the picture
+        (panel(WALL, roughness=60), 0),
+        (panel(Transform((0.0, 9.0, 0.5), (90.0, 0.0, 0.0), ONE)), 0),  # too small
+        (panel(Transform((0.0, 0.8, 0.5), (-90.0, 0.0, 0.0), ONE)), 1),  # its back
+        (Drawable(sphere(0.5), STILL, (plain(ONE, roughness=10, family="metal"),), MIRROR_ID), 0),
+    ],
+    ids=["mirror", "weak", "rough", "far", "back", "round"],
+)
+def test_what_shows_little_costs_no_image(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch, thing: Drawable, images: int
+) -> None:
+    drawn: list[int] = []
+    draw = Renderer._draw_mirror
+    monkeypatch.setattr(Renderer, "_draw_mirror", lambda *a: (drawn.append(1), draw(*a))[1])
+    assert np.isfinite(renderer.draw(things(thing), bake=bake_plain).radiance).all()
+    assert len(drawn) == images
 
 
 def test_rough_ground_has_no_image_and_costs_none(

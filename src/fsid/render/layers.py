@@ -26,12 +26,13 @@ _STEP_LAYERS = 16
 
 @dataclass(frozen=True)
 class Layer:
-    """index: in the texture arrays. slope_scale and shares as in `Texels`. roughness: its mean."""
+    """index: in the texture arrays. slope_scale and shares as in `Texels`. roughness, metallic: means."""
 
     index: int
     slope_scale: float
     shares: np.ndarray
     roughness: float
+    metallic: float
 
 
 def fitting_size(size: int, materials: int, budget_bytes: int = BUDGET_BYTES) -> int:
@@ -127,4 +128,5 @@ class LayerStore:
         for array, data in zip(self._arrays, texels.data, strict=True):
             array.write(slot, data)
         self._context.finish()  # or drivers keep the uploads of a whole scene
-        return Layer(slot, texels.slope_scale, texels.shares, float(texels.data[0][-1, 3]) / 255)
+        roughness, metallic = (float(texels.data[i][-1, 3]) / 255 for i in range(2))
+        return Layer(slot, texels.slope_scale, texels.shares, roughness, metallic)

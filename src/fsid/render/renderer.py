@@ -11,7 +11,7 @@ what is resident (texture slots) are addressed by whole numbers, and everything 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from types import TracebackType
 from typing import ClassVar, Self
@@ -32,8 +32,9 @@ from fsid.render.flow import flow_between
 from fsid.render.frame import Frame
 from fsid.render.fringes import magnified, with_margin
 from fsid.render.layers import Layer, LayerStore, fitting_size
-from fsid.render.mirror import mirror_shot
+from fsid.render.mirror import MOST, Mirror, clearest_mirror, ground_mirror
 from fsid.render.occlusion_pass import OcclusionPass
+from fsid.render.overview import OverviewPass
 from fsid.render.quality import QUALITIES, tap_table
 from fsid.render.sample_pass import SamplePass
 from fsid.render.shade_pass import ShadePass
@@ -42,12 +43,10 @@ from fsid.render.sharpness import set_sharpness
 from fsid.render.stage import Stage, stage_of
 from fsid.render.targets import Targets
 from fsid.render.texels import Bake, bake_texels
-from fsid.scene.model import ZERO, Camera, Scene
+from fsid.scene.model import ZERO, Camera, Material, Scene
 
 Mark = Callable[[str], None]
 """Called with the name of each stage when it has been issued; the benchmark measures with it."""
-
-_ABOVE_GROUND_M = 0.0005
 
 
 class Renderer:
@@ -103,12 +102,13 @@ class Renderer:
         self._drain = Drain(context)
         self._layers = LayerStore(context, texture_size, self._drain.run)
         self._targets = Targets(context, grid)
-        self._mirror_targets = Targets(context, grid)
+        self._mirror_targets = [Targets(context, grid) for _ in range(MOST)]
         table = tap_table(quality)
         self._taps = context.texture((table.shape[1], table.shape[0]), 2, table.tobytes(), dtype="f4")
         self._taps.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._shadows = ShadowPass(context, quality, grid, self._taps, self._drain.run)
         self._samples = SamplePass(context)
+        self._overview = OverviewPass(context)
         self._occlusion = OcclusionPass(context, quality, grid, self._taps)
         self._shade = ShadePass(context, quality, grid, self._shadows)
 
@@ -213,7 +213,6 @@ class Renderer:
         """All passes over a view; the result stays in the targets."""
         layers = self._load_layers(view, bake)
         stage = stage_of(view, layers, shot.time_s, self._quality.shadow_px)
-        below = mirror_shot(view, shot, lambda m: layers[m.family, m.variant].roughness * m.roughness_scale)
         mark("scene build")
         self._targets.resize((view.camera.width, view.camera.height), shot.lens.seen_px)
         self._shadows.resize(stage.plan)
@@ -224,18 +223,22 @@ class Renderer:
             # Shadows come third: a CPU makes their triangles ready while it draws the first two.
             self._samples.draw(self._targets, stage, buffers, shot)
             mark("samples")
+            self._overview.draw(self._targets, buffers)
             self._occlusion.draw(self._targets, buffers, shot)
             mark("occlusion")
-            self._shadows.draw(stage, buffers, [shot] if below is None else [shot, below])
+            mirrors = self._mirrors(view, shot, layers)
+            self._shadows.draw(stage, buffers, [shot, *(mirror.shot for mirror in mirrors)])
             mark("shadows")
-            if below is not None:
-                self._draw_mirror(stage, buffers, below)
-                mark("mirror")
-            self._draw_light(stage, buffers, shot, self._mirror_targets if below is not None else None)
+            images = list(zip(mirrors, self._mirror_targets, strict=False))
+            for mirror, targets in images:
+                self._draw_mirror(targets, stage, buffers, mirror)
+            mark("mirror")
+            self._draw_light(stage, buffers, shot, [(mirror.plane, targets) for mirror, targets in images])
             mark("shading")
         finally:
             buffers.release()
-            self._mirror_targets.release()
+            for targets in self._mirror_targets:
+                targets.release()
             self._targets.release_glass()
             return_free_blocks()
 
@@ -247,22 +250,34 @@ class Renderer:
             self._layers = LayerStore(self._context, size, self._drain.run)
         return self._layers.load(wanted, bake)
 
-    def _draw_mirror(self, stage: Stage, buffers: Buffers, below: Shot) -> None:
-        """The image that smooth ground shows, with what lies below the ground cut off."""
-        targets, size = self._mirror_targets, below.lens.seen_px
+    def _mirrors(self, view: View, shot: Shot, layers: dict[tuple[str, int], Layer]) -> list[Mirror]:
+        """The flat smooth surfaces that show images, from the G-buffer."""
+
+        def layer_of(material: Material) -> Layer:
+            return layers[material.family, material.variant]
+
+        overview = self._overview.read(self._targets, shot)
+        found = [ground_mirror(view, shot, layer_of), clearest_mirror(view, overview, shot, layer_of)]
+        return [mirror for mirror in found if mirror is not None]
+
+    def _draw_mirror(self, targets: Targets, stage: Stage, buffers: Buffers, mirror: Mirror) -> None:
+        """The image that a mirror shows, with what lies behind it cut off."""
+        shot, size = mirror.shot, mirror.shot.lens.seen_px
         targets.resize(size, size)
         camera = replace(stage.view.camera, width=size[0], vignetting=ZERO)
         stage = replace(stage, view=replace(stage.view, camera=camera))
-        self._samples.draw(targets, stage, buffers, below, lowest_m=_ABOVE_GROUND_M)
-        self._occlusion.draw(targets, buffers, below)
-        self._shadows.draw_blocks(targets, stage, buffers, below)
-        self._shade.draw(targets, stage, buffers, below, self._layers, shining=False)
+        self._samples.draw(targets, stage, buffers, shot, kept=mirror.kept)
+        self._occlusion.draw(targets, buffers, shot)
+        self._shadows.draw_blocks(targets, stage, buffers, shot)
+        self._shade.draw(targets, stage, buffers, shot, self._layers, shining=False)
 
-    def _draw_light(self, stage: Stage, buffers: Buffers, shot: Shot, mirror: Targets | None) -> None:
+    def _draw_light(
+        self, stage: Stage, buffers: Buffers, shot: Shot, mirrors: Sequence[tuple[np.ndarray, Targets]]
+    ) -> None:
         """The result, from samples, occlusion and shadows."""
         targets = self._targets
         self._shadows.draw_blocks(targets, stage, buffers, shot)
-        self._shade.draw(targets, stage, buffers, shot, self._layers, mirror=mirror)
+        self._shade.draw(targets, stage, buffers, shot, self._layers, mirrors=mirrors)
         if stage.glass.any():
             self._samples.draw_glass(targets, stage, buffers, shot)
             self._shade.draw_glass(targets, stage, buffers, shot, self._layers)

@@ -15,7 +15,7 @@ from fsid.render.stage import Stage
 from fsid.render.targets import Targets
 
 _CLIP_DISTANCE0 = 0x3000
-_FAR_M = 1e9
+_ALL = np.array([0.0, 0.0, 0.0, -1.0])
 
 
 class SamplePass:
@@ -26,15 +26,15 @@ class SamplePass:
         self._visible = load_program(context, "visible.vert", "visible.frag")
 
     def draw(
-        self, targets: Targets, stage: Stage, buffers: Buffers, shot: Shot, *, lowest_m: float = -_FAR_M
+        self, targets: Targets, stage: Stage, buffers: Buffers, shot: Shot, *, kept: np.ndarray = _ALL
     ) -> None:
-        """Everything that is not glass, as far as it is higher than lowest_m."""
-        self._draw(targets, stage, buffers, shot, _nearest_first(stage, shot), 0, lowest_m)
+        """Everything that is not glass. kept: (4,) plane, normal and offset; what is behind is cut off."""
+        self._draw(targets, stage, buffers, shot, _nearest_first(stage, shot), 0, kept)
 
     def draw_glass(self, targets: Targets, stage: Stage, buffers: Buffers, shot: Shot) -> None:
         """Glass alone, in front of what `draw` has drawn."""
         seen = _nearest_first(stage, shot)
-        self._draw(targets, stage, buffers, shot, seen[stage.glass[seen]], 1, -_FAR_M)
+        self._draw(targets, stage, buffers, shot, seen[stage.glass[seen]], 1, _ALL)
 
     def _draw(
         self,
@@ -44,7 +44,7 @@ class SamplePass:
         shot: Shot,
         which: np.ndarray,
         layer: int,
-        lowest_m: float,
+        kept: np.ndarray,
     ) -> None:
         """layer: 0 of what is opaque, 1 of glass in front of that; shaders/visible.frag drops the other."""
         lens = shot.lens
@@ -56,7 +56,7 @@ class SamplePass:
             shift=shot.seen_shift,
             near=NEAR_M,
             layer=layer,
-            lowest=lowest_m,
+            kept=kept,
         )
         self._context.enable_only(moderngl.DEPTH_TEST)
         targets.begin_samples(over=layer == 1)

@@ -5,10 +5,12 @@ itself are drawn after the rest, where the rest has left a mark: on a CPU every 
 shader can do.
 
 What a scene does not have costs nothing: a program is compiled for each combination of lens, layers, area
-lights, glass and mirror that occurs.
+lights, glass and mirrors that occurs.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import moderngl
 import numpy as np
@@ -48,19 +50,22 @@ class ShadePass:
         shot: Shot,
         layers: LayerStore,
         *,
-        mirror: Targets | None = None,
+        mirrors: Sequence[tuple[np.ndarray, Targets]] = (),
         shining: bool = True,
     ) -> None:
-        """Everything but glass. mirror: the image that smooth ground shows. shining: whether what emits light
-        is seen to."""
+        """Everything but glass. mirrors: planes, and the images that they show. shining: whether what emits
+        light is seen to."""
         targets.begin_shading()
-        if mirror is not None:
-            mirror.use_mirror(11)
-        context, planar = self._context, int(mirror is not None)
+        for i, (_, image) in enumerate(mirrors):
+            image.use_mirror(11 + i)
+        context, planar = self._context, len(mirrors)
+        planes = np.array([plane for plane, _ in mirrors])
 
         def draw_part(own: int) -> None:
             program = self._program(shot.lens.model, stage, GLASS=0, PLANAR=planar, OWN=own)
-            set_uniforms(program, block_lights=targets.block_lights, shining=float(shining))
+            set_uniforms(
+                program, block_lights=targets.block_lights, shining=float(shining), mirror_planes=planes
+            )
             self._shade(program, targets, stage, buffers, shot, layers)
 
         context.enable_only(moderngl.DEPTH_TEST)

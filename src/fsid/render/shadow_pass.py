@@ -46,15 +46,17 @@ class ShadowPass:
 
     def draw(self, stage: Stage, buffers: Buffers, shots: Sequence[Shot]) -> None:
         """The tiles that any of the shots can see, and their moments."""
-        geometry, lens = stage.geometry, shots[0].lens
-        centres, radii = geometry.spheres[:, :3], geometry.spheres[:, 3]
-        deepest = float((np.linalg.norm(centres - lens.position, axis=1) + radii).max())
-        deepest += 2 * abs(float(lens.position[2]))
+        geometry = stage.geometry
+        deepest = [_deepest_m(geometry.spheres, shot) for shot in shots]
         self._context.enable_only(moderngl.DEPTH_TEST)
         self._atlas.begin()
         array = buffers.vertex_array(self._depth)
         set_uniforms(self._depth, near=NEAR_M)
-        seen = [tile for tile in stage.plan.tiles if any(sees(shot, tile, deepest) for shot in shots)]
+        seen = [
+            tile
+            for tile in stage.plan.tiles
+            if any(sees(*seeing, tile) for seeing in zip(shots, deepest, strict=True))
+        ]
         for tile in seen:
             self._atlas.framebuffer.viewport = (*tile.corner, stage.plan.tile_px, stage.plan.tile_px)
             set_uniforms(
@@ -99,6 +101,11 @@ class ShadowPass:
         )
         self._atlas.use(compare_unit=2, moments_unit=3)
         self._taps.use(7)
+
+
+def _deepest_m(spheres: np.ndarray, shot: Shot) -> float:
+    """No surface is farther from the lens than this."""
+    return float((np.linalg.norm(spheres[:, :3] - shot.lens.position, axis=1) + spheres[:, 3]).max())
 
 
 def _casters(stage: Stage, tile: Tile) -> np.ndarray:

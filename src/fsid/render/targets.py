@@ -29,6 +29,7 @@ class Targets:
         self._results: list[list[Any]] = []
         self._drawn: tuple[list[Any], Sequence[Place]] = ([], [])
         self._lit: list[Any] = []
+        self._overview: list[Any] = []
         self._lit_rows = 0
         self.block_lights = 0
         self.size = self.seen = (0, 0)
@@ -72,6 +73,27 @@ class Targets:
         self._to_samples.depth_mask = not over
         self._to_samples.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
         self._to_samples.depth_mask = True
+
+    def begin_overview(self, width: int) -> tuple[int, int]:
+        """Draw a grid of places, `width` of them in a row; its size. Unit 0 holds the G-buffer."""
+        height = max(1, round(width * self.seen[1] / self.seen[0]))
+        if not self._overview:
+            texture = self._context.texture((width, height), 4, dtype="u4")
+            texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+            self._overview = [self._context.framebuffer([texture]), texture]
+        self._samples.use(0)
+        self._overview[0].use()
+        return (width, height)
+
+    def read_overview(self) -> tuple[np.ndarray, np.ndarray]:
+        """(N, 2) places, 0..1 of the G-buffer, and (N, 4) uint32 samples of it there."""
+        framebuffer, texture = self._overview
+        width, height = texture.size
+        data = framebuffer.read((0, 0, width, height), 4, dtype="u4")
+        large = np.array(self.seen) * self._grid
+        row, column = np.divmod(np.arange(width * height), width)
+        texel = (2 * np.column_stack([column, row]) + 1) * large // (2 * np.array([width, height]))
+        return (texel + 0.5) / large, np.frombuffer(data, np.uint32).reshape(-1, 4)
 
     def begin_block_depth(self) -> None:
         """Draw the depth of the blocks; unit 0 holds the G-buffer."""
@@ -193,9 +215,10 @@ class Targets:
 
     def release(self) -> None:
         """Free the images."""
-        for item in [*self._owned, *(part for result in self._results for part in result)]:
+        results = [part for result in self._results for part in result]
+        for item in [*self._owned, *self._overview, *results]:
             item.release()
-        self._owned, self._results = [], []
+        self._owned, self._results, self._overview = [], [], []
         self._release_lit()
         self.size = self.seen = (0, 0)
 

@@ -17,7 +17,7 @@
 #include "blocks.glsl"
 #include "reflector.glsl"
 #if PLANAR
-#include "ground.glsl"
+#include "planar.glsl"
 #endif
 layout(binding = 10) uniform sampler2D sky;   // equirectangular
 uniform float sky_level;  // mip level at which a texel of the sky is a pixel; -1 without sky
@@ -84,14 +84,12 @@ vec3 seen_through(Sample p, Surface s, vec3 n, vec3 v) {
 }
 #endif
 
-// What comes from direction r, averaged over a lobe of width alpha: the room's walls or the sky; on smooth ground
-// the things that stand on it.
+// What comes from direction r, averaged over a lobe of width alpha: the room's walls or the sky; on flat mirrors
+// the things before them.
 vec3 surroundings_in(Sample p, vec3 r, float alpha) {
     vec3 room = mirrored(p.position, r, alpha);
 #if PLANAR
-    bool ground = abs(p.position.z) < 0.002 && p.face_normal.z > 0.999;
-    float share = ground ? 1.0 - smoothstep(0.12, 0.25, alpha) : 0.0;
-    room = mix(room, ground_image(p, r, alpha, share > 0.0), share);
+    room = with_mirrors(room, p, r, alpha);
 #endif
     return room;
 }

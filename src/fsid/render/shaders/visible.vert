@@ -9,7 +9,7 @@ uniform vec2 focal;
 uniform vec2 shift;
 uniform float near;
 uniform uint layer;       // 0 what is opaque, 1 glass
-uniform float lowest;     // what lies below this height is cut off
+uniform vec4 kept;        // normal and offset of a plane: what lies behind it is cut off
 out vec3 from_camera;     // world axes
 out vec3 normal;
 out float distance_m;     // along the viewing axis
@@ -20,7 +20,7 @@ void main() {
     vec3 local = axes * from_camera;
     distance_m = local.z;
     normal = in_normal;
-    gl_ClipDistance[0] = in_world.z - lowest;
+    gl_ClipDistance[0] = dot(in_world, kept.xyz) - kept.w;
     surface = in_surface & 0x7fffffffu;
     gl_Position = vec4(local.xy * focal + shift * local.z, local.z - 2.0 * near, local.z);
     if (in_surface >> 31 != layer) gl_Position = vec4(0.0, 0.0, -2.0, 1.0);   // clipped
