@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 
 pytest.importorskip("mitsuba", reason="needs the extra fsid[reference]")
 
@@ -207,6 +208,28 @@ def test_the_rasteriser_agrees_with_the_path_tracer(lights: tuple[str, ...], wid
     assert found.normal_off < 0.01
     assert found.albedo_off < 0.01
     assert 0.95 < found.ratio[2] < 1.05
+
+
+@pytest.mark.parametrize("mirror", ["floor", "wall_north"])
+def test_a_mirror_shows_what_the_path_tracer_sees_in_it(mirror: str):
+    """Two bounces, so that things are lit directly: how bright the image is, and where it is bright.
+
+    The floor's is darker where things touch it, because occlusion takes from its mirror, too.
+    """
+    black = Material("paint", 0, ((0.0, 0.0, 0.0),) * 3, 1.0, 0.0, 10.0, 0.0)
+    metal = Material("anodised_metal", 0, ((0.9, 0.9, 0.9),) * 3, 1.0, 0.0, 0.0, 0.0)
+    walls = Background("room", (4.0, 2.4, 2.6), dict.fromkeys(WALLS, black) | {mirror: metal})
+    ahead = Camera((0.3, -1.1, 0.7), (-0.1, 0.0, 0.0), (0.0, 0.0, 1.0), 60.0, 160, 90)
+    beyond = replace(ahead, position_m=(0.9, -1.0, 0.9), target_m=(-0.1, 0.6, 0.2))
+    camera = ahead if mirror == "floor" else beyond
+    scene = replace(still_life(LIGHTS["point"]), background=walls, cameras=(camera,))
+    traced = ReferenceRenderer(samples=64, bounces=2, texture_size=128, edge_px=1.2).render(scene)
+    with Renderer(texture_size=128) as raster:
+        drawn = raster.render(scene)
+    shown = (drawn.object_id == -1) & (drawn.albedo.mean(-1) > 0.5)
+    a, b = (gaussian_filter(frame.radiance.mean(-1) * shown, 1.0)[shown] for frame in (drawn, traced))
+    assert np.corrcoef(a, b)[0, 1] > 0.85
+    assert np.median(a) / np.median(b) == pytest.approx(1.0, abs=0.2)
 
 
 def glossy_floor(light: Light, family: str, roughness: float, grey: float = 0.5, **layers: float) -> Scene:

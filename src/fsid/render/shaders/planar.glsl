@@ -15,7 +15,7 @@ float mirrored_at(sampler2D image, vec2 at, float depth, float reach) {
 // all, so that their edges do not glow into what is far behind them. wanted: false gives nothing of use, soon.
 vec3 mirror_image(sampler2D image, vec4 plane, Sample p, vec3 r, float alpha, bool wanted) {
     vec3 local = axes * (p.position - origin);
-    float reach = length(local), width = 2.0 * alpha * 0.5 * seen_focal.x;
+    float reach = length(local), width = 2.8 * alpha * 0.5 * seen_focal.x;   // as a path tracer blurs
     vec2 at = seen_at(local / local.z) / vec2(seen);
     float beyond = mirrored_at(image, at, local.z, reach);
     vec2 aside = vec2(1.0, float(seen.x) / float(seen.y)) * min(width * beyond / (beyond + reach), 0.1);
