@@ -68,7 +68,7 @@ def scenes_of(count: int, width: int, height: int, *, plain: bool = False) -> li
     if plain:
         config = replace(
             config,
-            materials=MaterialConfig(lobe_share=0.0),
+            materials=MaterialConfig(lobe_share=0.0, cast_share=0.0),
             background=BackgroundConfig(kind_shares=(1.0, 0.0, 0.0, 0.0)),
             lights=LightConfig(count=(3, 3), kind_shares=(0.6, 0.4, 0.0)),
             lens=LensConfig(

@@ -247,6 +247,24 @@ def test_a_new_family_changes_only_the_draws_that_it_wins(monkeypatch):
     assert 0 < changed < 5 * total / len(mesh_families())
 
 
+def test_a_scene_of_casts_is_the_same_scene_in_one_grey_paint():
+    """Everything but the objects' materials is what it was, and the greys differ from scene to scene."""
+    greys = set()
+    for seed in range(5):
+        own, cast = (
+            scene(seed, config=dataclasses.replace(CONFIG, materials=MaterialConfig(cast_share=share)))
+            for share in (0.0, 1.0)
+        )
+        assert dataclasses.replace(cast, materials=own.materials) == own
+        (paint,) = {material for materials in cast.materials for material in materials}
+        (colour,) = set(paint.colours)
+        (grey,) = set(colour)
+        assert len({material for materials in own.materials for material in materials}) > 5
+        greys.add(grey)
+    assert len(greys) == 5
+    assert 0 < sum(len({m for ms in scene(seed).materials for m in ms}) == 1 for seed in range(40)) < 25
+
+
 def test_a_knob_of_one_property_leaves_the_others_unchanged():
     base = scene(4)
     knobs = MaterialConfig(plain_share=0.5, relief_scale=(0.0, 0.1))

@@ -49,6 +49,8 @@ class MaterialConfig:
 
     plain_share: float = knob(0.14, 0.0, 1.0)
     """Share of surfaces in plain paint: homogeneous areas exist in reality too."""
+    cast_share: float = knob(0.25, 0.0, 1.0)
+    """Share of scenes whose objects are all in one grey paint, as plaster casts are: form without texture."""
     tile_scale: Range = knob((0.12, 1.2), 0.01, 100.0)
     """Texture tile width on objects relative to the natural width of its family; log-uniform."""
     roughness_scale: Range = knob((0.5, 1.4), 0.0, 10.0)

@@ -40,6 +40,14 @@ PLAIN = Material(
 )
 """The one plain default material of variant v1 ("objects")."""
 
+_CAST_GREY = (0.15, 0.8)
+
+
+def cast_rand(rng: np.random.Generator, config: SceneConfig) -> Material | None:
+    """The paint of all objects of a scene, a grey; None where they have materials of their own."""
+    cast, grey = rng.random() < config.materials.cast_share, float(rng.uniform(*_CAST_GREY))
+    return replace(PLAIN, colours=((grey,) * 3,) * 3) if cast else None
+
 
 def material_rand(
     rng: np.random.Generator,

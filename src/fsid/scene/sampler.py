@@ -27,7 +27,7 @@ from fsid.scene.colour import Mood
 from fsid.scene.config import SceneConfig
 from fsid.scene.lens import lens_rand
 from fsid.scene.lights import lighting_rand
-from fsid.scene.materials import PLAIN, material_rand
+from fsid.scene.materials import PLAIN, cast_rand, material_rand
 from fsid.scene.model import Camera, Material, Object, Scene, Transform
 from fsid.scene.placement import arranged, scattered
 from fsid.scene.pools import GROWN, NATURE
@@ -57,6 +57,7 @@ class Streams(NamedTuple):
     lens: np.random.SeedSequence
     sky: np.random.SeedSequence
     nature: np.random.SeedSequence
+    cast: np.random.SeedSequence
 
 
 def sample(
@@ -79,7 +80,8 @@ def sample(
     S = _objects_rand(fixed.S if variant == "materials" else streams.S, config)
     if outdoors and variant != "materials":
         S = _grown_rand(streams.nature, S, config)
-    M = _materials_rand(streams.M, S, config, mood, plain=variant == "objects", outdoors=outdoors)
+    paint = PLAIN if variant == "objects" else cast_rand(np.random.default_rng(streams.cast), config)
+    M = _materials_rand(streams.M, S, config, mood, paint=paint, outdoors=outdoors)
     if variant == "full":
         places = [light.position_m for light in lighting.lights if light.kind != "sun"]
         keep_clear = np.array([view.position_m, *(camera.position_m for camera in cameras), *places])
@@ -137,19 +139,17 @@ def _materials_rand(
     config: SceneConfig,
     mood: Mood,
     *,
-    plain: bool,
+    paint: Material | None,
     outdoors: bool,
 ) -> tuple[tuple[Material, ...], ...]:
     """One material per part, alike for copies; one stream per object, so that its number of parts disturbs no
-    other."""
+    other. paint: of all of them."""
     out: dict[Object, tuple[Material, ...]] = {}
     for S, child in zip(objects, stream.spawn(len(objects)), strict=True):
         if S not in out:
             names, rng = build_mesh(S.family, S.seed).part_names, np.random.default_rng(child)
             pools = GROWN if outdoors and S.family in NATURE else {}
-            out[S] = tuple(
-                PLAIN if plain else material_rand(rng, config, mood, name, pools) for name in names
-            )
+            out[S] = tuple(paint or material_rand(rng, config, mood, name, pools) for name in names)
     return tuple(out[S] for S in objects)
 
 
