@@ -52,7 +52,7 @@ def rectangles(
     return found if sum(w * h for _, _, w, h in found) < size[0] * size[1] else whole
 
 
-def sees(shot: Shot, deepest_m: float, tile: Tile) -> bool:
+def sees(shot: Shot, tile: Tile, deepest_m: float) -> bool:
     """Whether anything that is seen can lie in the tile; no other tile is ever looked up.
 
     deepest_m: no surface is farther from the lens than this. Two pyramids are apart where a side of one has

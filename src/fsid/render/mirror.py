@@ -14,7 +14,7 @@ flat sides of objects: of what is seen in an overview of the picture, the share 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,7 +23,6 @@ from fsid.render.drawable import BACKGROUND_ID, View
 from fsid.render.exposure import Shot
 from fsid.render.layers import Layer
 from fsid.render.overview import Overview
-from fsid.scene.model import Material
 
 MOST = 2
 """Mirrors in one picture."""
@@ -49,7 +48,7 @@ _OFF_M = 5e-4
 _LEVEL = 0.999  # cosine
 _NORMAL_STEPS, _STEPS_PER_M = 50, 50
 
-LayerOf = Callable[[Material], Layer]
+Layers = Mapping[tuple[str, int], Layer]
 
 
 @dataclass(frozen=True)
@@ -65,19 +64,19 @@ class Mirror:
         return self.plane + np.array([0.0, 0.0, 0.0, _OFF_M])
 
 
-def ground_mirror(view: View, shot: Shot, layer_of: LayerOf) -> Mirror | None:
+def ground_mirror(view: View, shot: Shot, layers: Layers) -> Mirror | None:
     """That of smooth ground in z = 0; None without any, out of doors, or below it."""
     indoors, above = view.sky is None, shot.lens.position[2] > 10 * _FLAT_M
-    roughness = _least_roughness(view, layer_of) if indoors and above else 1.0
+    roughness = _least_roughness(view, layers) if indoors and above else 1.0
     if roughness >= ROUGHEST:
         return None
     return _mirror(np.array([0.0, 0.0, 1.0, 0.0]), shot, roughness)
 
 
-def clearest_mirror(view: View, overview: Overview, shot: Shot, layer_of: LayerOf) -> Mirror | None:
+def clearest_mirror(view: View, overview: Overview, shot: Shot, layers: Layers) -> Mirror | None:
     """That of the plane, other than the ground, that shows most; None if none shows LEAST_SHOWN."""
     n, x = overview.face_normal, overview.position
-    polish = _Polish.of(view, layer_of, overview.surface)
+    polish = _Polish.of(view, layers, overview.surface)
     ground = (np.abs(x[:, 2]) < 2 * _FLAT_M) & (n[:, 2] > _LEVEL) & polish.background
     flat = np.abs((n * overview.normal).sum(1)) > _LEVEL
     to_eye = shot.lens.position - x
@@ -104,8 +103,8 @@ def clearest_mirror(view: View, overview: Overview, shot: Shot, layer_of: LayerO
 
 @dataclass(frozen=True)
 class _Polish:
-    """Of the surfaces at some places, (N,) each. body, coat: how clear their images are, times what share of
-    light has them. specular: of the body at normal incidence. background: whether they are no objects."""
+    """Of the surfaces at some places, (N,) each. roughness: mean, 0..1. body, coat: how clear an image they
+    show, 0..1. specular: reflectance of the body at normal incidence. background: no object."""
 
     roughness: np.ndarray
     body: np.ndarray
@@ -114,13 +113,13 @@ class _Polish:
     background: np.ndarray
 
     @classmethod
-    def of(cls, view: View, layer_of: LayerOf, surface: np.ndarray) -> _Polish:
+    def of(cls, view: View, layers: Layers, surface: np.ndarray) -> _Polish:
         """surface: numbers in the order of `fsid.render.geometry.merge`."""
         table = [(drawable, material) for drawable in view.drawables for material in drawable.materials]
         found, place = np.unique(surface, return_inverse=True)
         rows = []
         for drawable, material in (table[i] for i in found):
-            layer = layer_of(material)
+            layer = layers[material.family, material.variant]
             rough = min(layer.roughness * material.roughness_scale, 1.0)
             bright = float((layer.shares @ np.array(material.colours)).mean())
             specular = drawable.specular + layer.metallic * (bright - drawable.specular)
@@ -164,7 +163,7 @@ def _mirror(plane: np.ndarray, shot: Shot, roughness: float) -> Mirror:
     return Mirror(plane, replace(shot, lens=behind, shift_px=shift_px, lens_offset=(0.0, 0.0)))
 
 
-def _least_roughness(view: View, layer_of: LayerOf) -> float:
+def _least_roughness(view: View, layers: Layers) -> float:
     """Mean roughness of the smoothest ground or coat in z = 0; 1 without ground there."""
     least = 1.0
     for drawable in view.drawables:
@@ -175,5 +174,6 @@ def _least_roughness(view: View, layer_of: LayerOf) -> float:
         for part in np.unique(mesh.face_parts[flat[mesh.faces].all(1)]):
             material = drawable.materials[int(part)]
             coat = material.clearcoat_roughness if material.clearcoat >= _LEAST_COAT else 1.0
-            least = min(least, layer_of(material).roughness * material.roughness_scale, coat)
+            rough = layers[material.family, material.variant].roughness * material.roughness_scale
+            least = min(least, rough, coat)
     return least

@@ -43,7 +43,7 @@ from fsid.render.sharpness import set_sharpness
 from fsid.render.stage import Stage, stage_of
 from fsid.render.targets import Targets
 from fsid.render.texels import Bake, bake_texels
-from fsid.scene.model import ZERO, Camera, Material, Scene
+from fsid.scene.model import ZERO, Camera, Scene
 
 Mark = Callable[[str], None]
 """Called with the name of each stage when it has been issued; the benchmark measures with it."""
@@ -252,12 +252,8 @@ class Renderer:
 
     def _mirrors(self, view: View, shot: Shot, layers: dict[tuple[str, int], Layer]) -> list[Mirror]:
         """The flat smooth surfaces that show images, from the G-buffer."""
-
-        def layer_of(material: Material) -> Layer:
-            return layers[material.family, material.variant]
-
         overview = self._overview.read(self._targets, shot)
-        found = [ground_mirror(view, shot, layer_of), clearest_mirror(view, overview, shot, layer_of)]
+        found = [ground_mirror(view, shot, layers), clearest_mirror(view, overview, shot, layers)]
         return [mirror for mirror in found if mirror is not None]
 
     def _draw_mirror(self, targets: Targets, stage: Stage, buffers: Buffers, mirror: Mirror) -> None:

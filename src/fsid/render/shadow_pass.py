@@ -47,7 +47,7 @@ class ShadowPass:
     def draw(self, stage: Stage, buffers: Buffers, shots: Sequence[Shot]) -> None:
         """The tiles that any of the shots can see, and their moments."""
         geometry = stage.geometry
-        deepest = [_deepest_m(geometry.spheres, shot) for shot in shots]
+        deepest_m = [_deepest_m(geometry.spheres, shot) for shot in shots]
         self._context.enable_only(moderngl.DEPTH_TEST)
         self._atlas.begin()
         array = buffers.vertex_array(self._depth)
@@ -55,7 +55,7 @@ class ShadowPass:
         seen = [
             tile
             for tile in stage.plan.tiles
-            if any(sees(*seeing, tile) for seeing in zip(shots, deepest, strict=True))
+            if any(sees(shot, tile, far) for shot, far in zip(shots, deepest_m, strict=True))
         ]
         for tile in seen:
             self._atlas.framebuffer.viewport = (*tile.corner, stage.plan.tile_px, stage.plan.tile_px)

@@ -41,6 +41,7 @@ PLAIN = Material(
 """The one plain default material of variant v1 ("objects")."""
 
 _CAST_GREY = (0.15, 0.8)
+"""Albedo of casts, uniform between these."""
 
 
 def cast_rand(rng: np.random.Generator, config: SceneConfig) -> Material | None:
