@@ -177,6 +177,15 @@ def test_a_procedural_sky_has_its_mean(cloudiness: float) -> None:
     assert picture.min() >= 0
 
 
+def test_a_cloud_is_darker_where_it_is_thicker() -> None:
+    """So an overcast sky is no even white: brighter where it is thin, and hardly coloured anywhere."""
+    picture = panorama(Sky("procedural", (1.0, 1.0, 1.0), seed=4, cloudiness=1.0))
+    overhead = picture[: len(picture) // 4]
+    grey = overhead[overhead[..., 2] < 1.5 * overhead[..., 0]] @ (0.2126, 0.7152, 0.0722)
+    assert len(grey) > 0.7 * overhead[..., 0].size
+    assert 1.3 < np.quantile(grey, 0.95) / np.quantile(grey, 0.05) < 2.5
+
+
 LOBES: dict[str, dict[str, float]] = {
     "clearcoat": {"clearcoat": 1.0},
     "sheen": {"sheen": 1.0},

@@ -1,7 +1,7 @@
 """The sky by direction: an equirectangular panorama, row 0 = zenith, column 0 = +x, turning towards +y.
 
     clear sky    colour * mix(zenith, horizon, (1 - sin elevation)^4)      below the horizon: ground glow
-    clouds       white, where fractal value noise exceeds a level set by `cloudiness`
+    clouds       where fractal value noise exceeds a level set by `cloudiness`: white, greyer the thicker
 
 scaled so that the mean radiance of the upper half (by solid angle) is `Sky.colour`. A picture file is used as
 it is, scaled likewise.
@@ -18,8 +18,9 @@ from fsid.scene.colour import LUMINANCE
 from fsid.scene.model import Sky
 
 HEIGHT = 512
-_ZENITH = np.array([0.55, 0.85, 1.6])
-_HORIZON = np.array([1.3, 1.25, 1.1])
+_ZENITH = np.array([0.42, 0.8, 1.7])
+_HORIZON = np.array([1.2, 1.25, 1.3])
+_THIN_CLOUD, _THICK_CLOUD = np.array([1.6, 1.75, 1.95]), np.array([0.75, 0.85, 1.0])
 _GROUND = 0.25
 
 
@@ -55,23 +56,26 @@ def _procedural(sky: Sky) -> np.ndarray:
     picture = np.repeat(picture, 2 * HEIGHT, axis=1)
     if sky.cloudiness > 0:
         above = picture[: HEIGHT // 2]
-        cover = _clouds(np.random.default_rng(sky.seed), elevation[: HEIGHT // 2], azimuth, sky.cloudiness)
-        above *= 1 - cover[..., None]
-        above += 1.6 * cover[..., None]
+        rng = np.random.default_rng(sky.seed)
+        cover, thickness = _clouds(rng, elevation[: HEIGHT // 2], azimuth, sky.cloudiness)
+        cloud = _THIN_CLOUD + thickness[..., None] * (_THICK_CLOUD - _THIN_CLOUD)
+        above += cover[..., None] * (cloud - above)
     return picture
 
 
 def _clouds(
     rng: np.random.Generator, elevation: np.ndarray, azimuth: np.ndarray, cloudiness: float
-) -> np.ndarray:
-    """(H, W) opacity 0..1 of a flat layer of clouds that thins out towards the horizon; elevation > 0."""
+) -> tuple[np.ndarray, np.ndarray]:
+    """(H, W) opacity and thickness, 0..1, of a flat layer of clouds that thins out towards the horizon;
+    elevation > 0."""
     lattice = rng.random((64, 64))
     reach = 1.0 / np.tan(np.maximum(elevation, 0.06))[:, None]
     x, y = reach * np.cos(azimuth), reach * np.sin(azimuth)
     noise = sum(0.5**octave * _lattice(lattice, x * 2**octave, y * 2**octave) for octave in range(6)) / 1.97
     level = 0.72 - 0.45 * cloudiness
     cover = np.clip((noise - level) / 0.18, 0.0, 1.0)
-    return np.asarray(cover * cover * (3 - 2 * cover) * np.clip(elevation / 0.15, 0, 1)[:, None])
+    opacity = cover * cover * (3 - 2 * cover) * np.clip(elevation / 0.15, 0, 1)[:, None]
+    return opacity, np.clip((noise - level) / 0.5, 0.0, 1.0)
 
 
 def _lattice(values: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:

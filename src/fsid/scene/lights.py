@@ -25,6 +25,8 @@ KINDS = ("point", "spot", "area")
 """The order of `LightConfig.kind_shares`."""
 
 SUN_TANGENT = 0.0047
+_CLEAR, _OVERCAST = (0.0, 0.8), (0.6, 1.0)
+"""Cloudiness with and without sun."""
 _LEAST_PRIMARY = 0.05
 """Candle light has no blue within sRGB: this much is left, for the camera to amplify."""
 _VIEW_DEG = 55.0
@@ -155,7 +157,7 @@ def _daylight_rand(
     sun_k = float(np.interp(height_deg, (5, 40), (3000, 5600)))
     ratio = log_uniform_rand(rng, config.sun_to_sky) if sunny else 0.0
     haze = log_uniform_rand(rng, (1.0, 8.0))
-    cloudiness = float(rng.random())
+    cloudiness = float(np.interp(rng.random(), (0, 1), _CLEAR if sunny else _OVERCAST))
     sky_k = np.interp(cloudiness, (0.0, 1.0), (16000.0, 6500.0)) * np.exp(rng.normal(0, 0.1))
     seed, turn_deg = int(rng.integers(2**31)), float(rng.uniform(0, 360))
     sky = Sky(
