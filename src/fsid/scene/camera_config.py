@@ -22,6 +22,10 @@ class CameraConfig:
     """Horizontal field of view."""
     roll_deg: float = knob(2.5, 0.0, 180.0)
     """Standard deviation of the camera's roll."""
+    skyward_share: float = knob(0.5, 0.0, 1.0)
+    """Share of views in open air that are taken from low down and look up: things before the sky."""
+    skyward: Range = knob((0.5, 2.5), -10.0, 10.0)
+    """How far below the middle of those pictures the horizon lies; 1 is their lower edge."""
 
     def __post_init__(self) -> None:
         check_knobs(self)

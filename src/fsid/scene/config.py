@@ -50,7 +50,7 @@ class MaterialConfig:
     plain_share: float = knob(0.14, 0.0, 1.0)
     """Share of surfaces in plain paint: homogeneous areas exist in reality too."""
     cast_share: float = knob(0.25, 0.0, 1.0)
-    """Share of scenes whose objects are all in one grey paint, as plaster casts are: form without texture."""
+    """Share of scenes whose objects are all in one paint, as painted casts are: form without texture."""
     tile_scale: Range = knob((0.12, 1.2), 0.01, 100.0)
     """Texture tile width on objects relative to the natural width of its family; log-uniform."""
     roughness_scale: Range = knob((0.5, 1.4), 0.0, 10.0)
@@ -59,7 +59,7 @@ class MaterialConfig:
     """Factor on the relief of the height maps."""
     albedo: Range = knob((0.02, 0.9), 0.0, 1.0)
     """Limits of the linear albedo of surface colours, per channel."""
-    palette_shares: tuple[float, float, float, float] = shares(0.60, 0.12, 0.06, 0.22)
+    palette_shares: tuple[float, float, float, float] = shares(0.66, 0.12, 0.06, 0.16)
     """Shares of the palette models natural, harmonised, lab, grey."""
     contrast: Range = knob((0.3, 1.0), 0.0, 1.0)
     """How far the colours of one material may lie apart: 1 as drawn, 0 all alike."""
@@ -86,7 +86,7 @@ class MaterialConfig:
 class BackgroundConfig:
     """B: what surrounds the objects."""
 
-    kind_shares: tuple[float, float, float, float] = shares(0.42, 0.1, 0.13, 0.35)
+    kind_shares: tuple[float, float, float, float] = shares(0.33, 0.08, 0.11, 0.48)
     """Shares of room, backdrop, tabletop, open-air."""
     width_m: Range = knob((3.0, 6.0), 2.0, 100.0)
     """Width of a closed room along x and along y."""

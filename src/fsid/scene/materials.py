@@ -18,7 +18,7 @@ from fsid.assets import (
     part_kind,
 )
 from fsid.scene.choice import log_uniform_rand, pick_rand
-from fsid.scene.colour import PALETTES, Mood, albedo_rgb, calmed, lab_rand, related_rand
+from fsid.scene.colour import PALETTES, Mood, albedo_rgb, calmed, lab_rand, mood_rand, related_rand
 from fsid.scene.config import SceneConfig
 from fsid.scene.knobs import Range
 from fsid.scene.lobes import lobes_rand
@@ -40,14 +40,17 @@ PLAIN = Material(
 )
 """The one plain default material of variant v1 ("objects")."""
 
-_CAST_GREY = (0.15, 0.8)
-"""Albedo of casts, uniform between these."""
+_CAST_PALETTES = (0.35, 0.3, 0.3, 0.05)
+"""Shares of `PALETTES` that the colour of casts comes from."""
 
 
 def cast_rand(rng: np.random.Generator, config: SceneConfig) -> Material | None:
-    """The paint of all objects of a scene, a grey; None where they have materials of their own."""
-    cast, grey = rng.random() < config.materials.cast_share, float(rng.uniform(*_CAST_GREY))
-    return replace(PLAIN, colours=((grey,) * 3,) * 3) if cast else None
+    """The paint of all objects of a scene, of one colour; None where they have materials of their own."""
+    knobs = config.materials
+    cast, mood = rng.random() < knobs.cast_share, mood_rand(rng, knobs.calm_share, knobs.variation)
+    lab = lab_rand(rng, PALETTES[int(rng.choice(len(PALETTES), p=_CAST_PALETTES))], mood)
+    colour = vec3(albedo_rgb(lab[None], *knobs.albedo)[0])
+    return replace(PLAIN, colours=(colour,) * 3) if cast else None
 
 
 def material_rand(

@@ -24,31 +24,46 @@ from fsid.scene.vectors import direction_of, vec3
 
 LOW_VIEW_DEG, LOW_VIEW_M = 20.0, 1.25
 """Below this elevation a camera keeps this distance: the fixed arrangement of v1-v3 ends before it."""
+SKYWARD_ELEVATION = 0.2
+"""Views that look up are taken from so many times the elevation that was drawn."""
 
 _TREMOR_HZ = (1.0, 12.0)
 _SINES = 6
 
 
 def camera_rand(
-    rng: np.random.Generator, config: CameraConfig, space: Space, width: int, height: int
+    rng: np.random.Generator,
+    config: CameraConfig,
+    space: Space,
+    width: int,
+    height: int,
+    *,
+    outdoors: bool,
 ) -> tuple[Camera, np.ndarray]:
-    """A camera inside the space that looks at the focus, and the focus (3,) in metres."""
+    """A camera inside the space, and the focus (3,) in metres, which it looks at, or above it at the sky."""
+    sky_rng = rng.spawn(1)[0]
+    skyward, horizon = outdoors and sky_rng.random() < config.skyward_share, sky_rng.uniform(*config.skyward)
     focus = np.array([0.0, 0.0, rng.uniform(0.2, 0.5)])
     distance = log_uniform_rand(rng, config.distance_m)
     azimuth_deg, elevation_deg = rng.uniform(0, 360), rng.uniform(*config.elevation_deg)
+    elevation_deg *= SKYWARD_ELEVATION if skyward else 1.0
     if elevation_deg < LOW_VIEW_DEG:
         distance = max(distance, LOW_VIEW_M / np.cos(np.radians(elevation_deg)))
     direction = direction_of(azimuth_deg, elevation_deg)
     position = focus + direction * space.reach(focus, direction, distance)
     target = focus + rng.normal(0, 0.12, 3) * np.linalg.norm(position - focus)
-    roll = np.radians(rng.normal(0, config.roll_deg))
+    roll, fov_deg = np.radians(rng.normal(0, config.roll_deg)), float(rng.uniform(*config.fov_deg))
+    if skyward:
+        ahead = target - position
+        rise = horizon * np.tan(np.radians(fov_deg / 2)) * height / width
+        ahead[2] = rise * np.hypot(ahead[0], ahead[1])
+        target = position + ahead
     forward = (target - position) / np.linalg.norm(target - position)
     right = np.cross(forward, (0.0, 0.0, 1.0))
     if np.linalg.norm(right) < 1e-3:
         right = direction_of(azimuth_deg + 90, 0)
     right /= np.linalg.norm(right)
     up = np.cos(roll) * np.cross(right, forward) + np.sin(roll) * right
-    fov_deg = float(rng.uniform(*config.fov_deg))
     return Camera(vec3(position), vec3(target), vec3(up), fov_deg, width, height), focus
 
 
