@@ -7,7 +7,8 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 TEST_READY := $(VENV)/.test-ready
-BENCH_WITH_INPUT := bench/altered_pictures.py bench/conditioning.py bench/cycles.py bench/error_bands.py
+BENCH_WITH_INPUT := bench/altered_photographs.py bench/altered_pictures.py bench/conditioning.py bench/cycles.py \
+	bench/error_bands.py bench/error_colours.py bench/raw_octaves.py bench/what_if.py
 
 .PHONY: demo test bench setup clean
 

@@ -10,6 +10,7 @@ docs/rounds.md found what scenes lacked.
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from rich.console import Console
 from rich.table import Table
 
 from fsid.denoise import denoise_raw, load_model
+from fsid.errors import FsidError
 from fsid.evaluate.testset import read_testset
 from fsid.sensor import develop, read_raw
 
@@ -35,23 +37,37 @@ def bands(error: np.ndarray) -> np.ndarray:
     return np.array([np.bincount(octave.ravel(), part.ravel(), len(EDGES) + 1) for part in parts])
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+def results_on_a_testset(doc: str) -> tuple[list[str], int, Iterator[tuple[np.ndarray, list[np.ndarray]]]]:
+    """What TESTSET LEVEL MODEL MODEL ... of the command line ask for: the models' names, the number of
+    pictures, and of each picture the truth and every model's result, developed (H, W, 3). doc: of --help."""
+    parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("testset", type=Path)
     parser.add_argument("level", help="one of the test set's, such as iso3200")
     parser.add_argument("models", type=Path, nargs="+")
     given = parser.parse_args()
-    testset = read_testset(given.testset)
-    models = [load_model(path) for path in given.models]
-    errors = np.empty((len(models), len(testset.images), 2, len(EDGES) + 1))
-    for i, image in enumerate(testset.images):
-        truth = develop(read_raw(testset.clean(given.testset, image, given.level)))
-        noisy = read_raw(testset.noisy(given.testset, image, given.level))
-        for number, model in enumerate(models):
-            errors[number, i] = bands(develop(denoise_raw(noisy, model)) - truth)
-    print_table([path.name for path in given.models], errors)
+    try:
+        testset = read_testset(given.testset)
+        models = [load_model(path) for path in given.models]
+    except FsidError as problem:
+        parser.error(str(problem))
+    if given.level not in testset.levels:
+        parser.error(f"{given.testset} has no level '{given.level}', but {', '.join(testset.levels)}")
+
+    def pictures() -> Iterator[tuple[np.ndarray, list[np.ndarray]]]:
+        for image in testset.images:
+            truth = develop(read_raw(testset.clean(given.testset, image, given.level)))
+            noisy = read_raw(testset.noisy(given.testset, image, given.level))
+            yield truth, [develop(denoise_raw(noisy, model)) for model in models]
+
+    return [path.name for path in given.models], len(testset.images), pictures()
+
+
+def main() -> None:
+    names, count, pictures = results_on_a_testset(__doc__ or "")
+    errors = np.empty((len(names), count, 2, len(EDGES) + 1))
+    for i, (truth, results) in enumerate(pictures):
+        errors[:, i] = [bands(result - truth) for result in results]
+    print_table(names, errors)
 
 
 def print_table(names: list[str], errors: np.ndarray) -> None:

@@ -10,17 +10,12 @@ found that scenes lacked sky and leaves.
 
 from __future__ import annotations
 
-import argparse
-from pathlib import Path
-
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 from skimage.color import rgb2lab
 
-from fsid.denoise import denoise_raw, load_model
-from fsid.evaluate.testset import read_testset
-from fsid.sensor import develop, read_raw
+from error_bands import results_on_a_testset
 
 WINDOW_PX = 16
 GREY, PLAIN = 12.0, 0.015
@@ -46,26 +41,15 @@ def group_of(truth: np.ndarray) -> np.ndarray:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("testset", type=Path)
-    parser.add_argument("level", help="one of the test set's, such as iso3200")
-    parser.add_argument("models", type=Path, nargs="+")
-    given = parser.parse_args()
-    testset = read_testset(given.testset)
-    models = [load_model(path) for path in given.models]
-    count, errors = np.zeros(len(GROUPS)), np.zeros((len(models), len(GROUPS)))
-    for image in testset.images:
-        truth = windows(np.clip(develop(read_raw(testset.clean(given.testset, image, given.level))), 0, 1))
-        noisy = read_raw(testset.noisy(given.testset, image, given.level))
-        group = group_of(truth)
-        count += np.bincount(group, minlength=len(GROUPS)) / len(group)
-        results = (windows(np.clip(develop(denoise_raw(noisy, model)), 0, 1)) for model in models)
-        squared = np.array([((result - truth) ** 2).mean((1, 2)) for result in results])
-        squared /= squared[0].sum()
-        errors += [np.bincount(group, of_one, len(GROUPS)) for of_one in squared]
-    print_table([path.name for path in given.models], count / len(testset.images), errors)
+    names, pictures_count, pictures = results_on_a_testset(__doc__ or "")
+    share, errors = np.zeros(len(GROUPS)), np.zeros((len(names), len(GROUPS)))
+    for truth, results in pictures:
+        true = windows(np.clip(truth, 0, 1))
+        group = group_of(true)
+        share += np.bincount(group, minlength=len(GROUPS)) / len(group) / pictures_count
+        squared = [((windows(np.clip(result, 0, 1)) - true) ** 2).mean((1, 2)) for result in results]
+        errors += [np.bincount(group, of_one / squared[0].sum(), len(GROUPS)) for of_one in squared]
+    print_table(names, share, errors)
 
 
 def print_table(names: list[str], share: np.ndarray, errors: np.ndarray) -> None:
