@@ -15,7 +15,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from fsid.assets.mesh import Mesh
-from fsid.assets.solids import Solid, box, join, smooth_normals
+from fsid.assets.solids import Solid, box, join
+from fsid.assets.surfaces import smooth_normals
 from fsid.errors import FsidError
 
 TABLE_HEIGHT_M = 0.75

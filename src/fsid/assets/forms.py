@@ -15,7 +15,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fsid.assets.solids import Solid, join, lathe, smooth_normals
+from fsid.assets.solids import Solid, join, lathe
+from fsid.assets.surfaces import smooth_normals
 
 CREASE_COS = np.cos(np.radians(35.0))
 

@@ -15,12 +15,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
 
 from fsid.assets.mesh import Mesh
+from fsid.assets.surfaces import areas, cross, grid_faces, length, repeated, smooth_normals
+from fsid.assets.tube_frames import frames_along, tangents_of, with_caps
+from fsid.assets.unit_shapes import box_template, icosphere
 
 MIN_AREA_M2 = 1e-10
 """Triangles smaller than this are dropped: 10 um squared, below anything that a pixel can see."""
@@ -59,7 +61,7 @@ class Solid:
     def stretched(self, x: float, y: float, z: float) -> Solid:
         """Scaled per axis by positive factors; normals by the inverse transpose."""
         normals = self.normals / (x, y, z)
-        return Solid(self.vertices * (x, y, z), normals / _length(normals), self.faces)
+        return Solid(self.vertices * (x, y, z), normals / length(normals), self.faces)
 
     def warped(self, warp: Callable[[np.ndarray], np.ndarray]) -> Solid:
         """Bent by a smooth map (V, 3) -> (V, 3) that keeps orientation; normals by the cofactors of its
@@ -67,8 +69,8 @@ class Solid:
         moved = warp(self.vertices)
         a, b, c = ((warp(self.vertices + step) - moved) / 1e-6 for step in 1e-6 * np.eye(3))
         x, y, z = self.normals.T[:, :, None]
-        normals = x * _cross(b, c) + y * _cross(c, a) + z * _cross(a, b)
-        return Solid(moved, normals / np.maximum(_length(normals), 1e-30), self.faces)
+        normals = x * cross(b, c) + y * cross(c, a) + z * cross(a, b)
+        return Solid(moved, normals / np.maximum(length(normals), 1e-30), self.faces)
 
 
 def join(solids: Sequence[Solid]) -> Solid:
@@ -89,7 +91,7 @@ def assemble(parts: Mapping[str, Sequence[Solid]]) -> Mesh:
     face_parts = np.repeat(owner, [len(s.faces) for s in solids])
     low, high = whole.vertices.min(0), whole.vertices.max(0)
     vertices = (whole.vertices - ((low + high) * (0.5, 0.5, 0) + low * (0, 0, 1))).astype(np.float32)
-    keep = _areas(vertices.astype(np.float64), whole.faces) > MIN_AREA_M2
+    keep = areas(vertices.astype(np.float64), whole.faces) > MIN_AREA_M2
     return Mesh(
         vertices=vertices,
         normals=whole.normals.astype(np.float32),
@@ -101,7 +103,7 @@ def assemble(parts: Mapping[str, Sequence[Solid]]) -> Mesh:
 
 def box(size_x: float, size_y: float, size_z: float, bevel: float = 0.004, steps: int = 2) -> Solid:
     """Box with rounded edges, footprint centred, base on z = 0. `bevel` is limited to 49 % of a side."""
-    directions, signs, faces = _box_template(steps)
+    directions, signs, faces = box_template(steps)
     half = np.array((size_x, size_y, size_z)) / 2
     radius = min(bevel, 0.98 * half.min())
     vertices = signs * (half - radius) + directions * radius
@@ -113,7 +115,7 @@ def lathe(profile: Sequence[Sequence[float]], segments: int = 32, crease_deg: fl
     points = np.asarray(profile, dtype=float)
     points = points[np.r_[True, np.hypot(*np.diff(points, axis=0).T) > 1e-7]]
     heading = np.diff(points, axis=0)
-    heading /= _length(heading)
+    heading /= length(heading)
     bend = np.degrees(np.arccos(np.clip((heading[1:] * heading[:-1]).sum(1), -1, 1)))
     cuts = [0, *(np.flatnonzero(bend > crease_deg) + 1), len(points) - 1]
     return join([_revolved(points[a : b + 1], heading[a:b], segments) for a, b in pairwise(cuts)])
@@ -147,12 +149,12 @@ def tubes(
     """
     radii = np.broadcast_to(np.asarray(radius, dtype=float), paths.shape[:2])
     if not closed:
-        paths, radii = _with_caps(paths, radii, 3 if segments > 6 else 1)
-    normals, binormals = _frames(_tangents(paths, closed), closed)
+        paths, radii = with_caps(paths, radii, 3 if segments > 6 else 1)
+    normals, binormals = frames_along(tangents_of(paths, closed), closed)
     angle = np.linspace(0, 2 * np.pi, segments, endpoint=False)[:, None]
     ring = normals[:, :, None] * np.cos(angle) + binormals[:, :, None] * np.sin(angle)
     points = paths[:, :, None] + ring * radii[:, :, None, None]
-    faces = _repeated(_grid_faces(paths.shape[1], segments, wrap_rows=closed, wrap_cols=True), points)
+    faces = repeated(grid_faces(paths.shape[1], segments, wrap_rows=closed, wrap_cols=True), points)
     vertices = points.reshape(-1, 3)
     return Solid(vertices, smooth_normals(vertices, faces), faces)
 
@@ -165,7 +167,7 @@ def sheet(points: np.ndarray, thickness: float) -> Solid:
 def sheets(points: np.ndarray, thickness: float) -> Solid:
     """`sheet` over many grids `points` (k, n, m, 3) at once."""
     count, rows, cols = points.shape[:3]
-    faces = _repeated(_grid_faces(rows, cols), points)
+    faces = repeated(grid_faces(rows, cols), points)
     middle = points.reshape(-1, 3)
     normals = smooth_normals(middle, faces)
     lift = normals * thickness / 2
@@ -179,14 +181,14 @@ def sheets(points: np.ndarray, thickness: float) -> Solid:
 
 def ball(radii: np.ndarray | float, level: int = 4) -> Solid:
     """Icosphere of 10 * 4^level + 2 directions (`ball_directions`), each pushed to its radius in metres."""
-    directions, faces = _icosphere(level)
+    directions, faces = icosphere(level)
     vertices = directions * np.broadcast_to(np.asarray(radii, dtype=float), len(directions))[:, None]
     return Solid(vertices, smooth_normals(vertices, faces), faces)
 
 
 def ball_directions(level: int = 4) -> np.ndarray:
     """(V, 3) unit directions of the vertices of `ball`."""
-    return _icosphere(level)[0]
+    return icosphere(level)[0]
 
 
 def copies(solid: Solid, turns: np.ndarray, places: np.ndarray) -> Solid:
@@ -194,168 +196,25 @@ def copies(solid: Solid, turns: np.ndarray, places: np.ndarray) -> Solid:
     vertices = np.einsum("nij,vj->nvi", turns, solid.vertices) + places[:, None]
     normals = np.einsum("nij,vj->nvi", turns, solid.normals)
     faces = solid.faces + np.arange(len(turns))[:, None, None] * len(solid.vertices)
-    return Solid(vertices.reshape(-1, 3), (normals / _length(normals)).reshape(-1, 3), faces.reshape(-1, 3))
-
-
-def smooth_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """(V, 3) area-weighted vertex normals of welded triangles."""
-    cross = _facing(vertices, faces)
-    total = np.stack(
-        [np.bincount(faces.T.ravel(), np.tile(cross[:, k], 3), len(vertices)) for k in range(3)], axis=1
-    )
-    return total / np.maximum(_length(total), 1e-30)
-
-
-def _facing(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """(F, 3) normals of triangles, twice their areas long."""
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    return _cross(b - a, c - a)
-
-
-def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Cross products of the last axis; `numpy.cross` spends most of its time on moving axes."""
-    (ax, ay, az), (bx, by, bz) = (np.moveaxis(v, -1, 0) for v in (a, b))
-    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
-
-
-def _areas(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    cross = _facing(vertices, faces)
-    return np.sqrt(np.einsum("fi,fi->f", cross, cross)) / 2
-
-
-def _length(vectors: np.ndarray) -> np.ndarray:
-    return np.sqrt(np.einsum("...i,...i->...", vectors, vectors))[..., None]
-
-
-def _grid_faces(rows: int, cols: int, *, wrap_rows: bool = False, wrap_cols: bool = False) -> np.ndarray:
-    """Two triangles per cell of a (rows, cols) vertex grid, facing d_cols x d_rows."""
-    i = np.arange(rows if wrap_rows else rows - 1)[:, None]
-    j = np.arange(cols if wrap_cols else cols - 1)[None]
-    a, b = i * cols + j, i * cols + (j + 1) % cols
-    c, d = (i + 1) % rows * cols + (j + 1) % cols, (i + 1) % rows * cols + j
-    return np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3)
+    return Solid(vertices.reshape(-1, 3), (normals / length(normals)).reshape(-1, 3), faces.reshape(-1, 3))
 
 
 def _revolved(points: np.ndarray, heading: np.ndarray, segments: int) -> Solid:
     tangent = np.vstack([heading[:1], heading[1:] + heading[:-1], heading[-1:]])
-    tangent /= _length(tangent)
+    tangent /= length(tangent)
     angle = np.linspace(0, 2 * np.pi, segments, endpoint=False)
     circle = np.stack([np.cos(angle), np.sin(angle), np.ones(segments)], axis=1)
     vertices = points[:, None, [0, 0, 1]] * circle
     normals = np.stack([tangent[:, 1], tangent[:, 1], -tangent[:, 0]], axis=1)[:, None] * circle
-    faces = _grid_faces(len(points), segments, wrap_cols=True)
+    faces = grid_faces(len(points), segments, wrap_cols=True)
     return Solid(vertices.reshape(-1, 3), normals.reshape(-1, 3), faces)
-
-
-def _repeated(faces: np.ndarray, groups: np.ndarray) -> np.ndarray:
-    """The faces of one group of vertices, for each of `groups` (k, ..., 3) laid end to end."""
-    size = int(np.prod(groups.shape[1:-1]))
-    return (faces + np.arange(len(groups))[:, None, None] * size).reshape(-1, 3)
-
-
-def _with_caps(paths: np.ndarray, radii: np.ndarray, rings: int) -> tuple[np.ndarray, np.ndarray]:
-    """Extend both ends by a quarter circle of `rings` that closes to (nearly) a point."""
-    turn = np.linspace(0, np.pi / 2, rings + 1)[1:, None]
-    ends = []
-    for end, inner, radius in ((0, 1, radii[:, :1]), (-1, -2, radii[:, -1:])):
-        outward = paths[:, end] - paths[:, inner]
-        outward = (outward / _length(outward) * radius)[:, None]
-        ends.append((paths[:, [end]] + np.sin(turn) * outward, radius * np.maximum(np.cos(turn[:, 0]), 1e-3)))
-    (head, head_r), (tail, tail_r) = ends
-    return np.hstack([head[:, ::-1], paths, tail]), np.hstack([head_r[:, ::-1], radii, tail_r])
-
-
-def _tangents(paths: np.ndarray, closed: bool) -> np.ndarray:
-    around = np.roll(paths, -1, axis=1) - np.roll(paths, 1, axis=1)
-    step = around if closed else np.gradient(paths, axis=1)
-    return step / _length(step)
-
-
-def _frames(tangents: np.ndarray, closed: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Rotation-minimising normals and binormals; a closed path spreads the leftover twist evenly."""
-    first = tangents[:, 0]
-    normal = np.cross(first, np.eye(3)[np.abs(first).argmin(1)])
-    normals = [normal / _length(normal)]
-    for k in [*range(1, tangents.shape[1]), *([0] if closed else [])]:
-        tangent, normal = tangents[:, k], normals[-1]
-        normals.append(normal - tangent * (tangent * normal).sum(1, keepdims=True))
-    transported = np.stack(normals, axis=1)
-    transported /= _length(transported)
-    frame = transported[:, : tangents.shape[1]]
-    other = _cross(tangents, frame)
-    if closed:
-        last = transported[:, -1]
-        leftover = np.arctan2((last * other[:, 0]).sum(1), (last * frame[:, 0]).sum(1))
-        angle = (-leftover[:, None] * np.arange(tangents.shape[1]) / tangents.shape[1])[..., None]
-        frame, other = (
-            frame * np.cos(angle) + other * np.sin(angle),
-            other * np.cos(angle) - frame * np.sin(angle),
-        )
-    return frame, other
 
 
 def _rim(bottom: np.ndarray, top: np.ndarray, normals: np.ndarray) -> Solid:
     """The strips that close sheets, flat per edge; `bottom` and `top` (k, n, 3) run once around each."""
     bottom_after, top_after = np.roll(bottom, -1, axis=1), np.roll(top, -1, axis=1)
-    outward = _cross(bottom_after - bottom, normals + np.roll(normals, -1, axis=1))
-    outward /= np.maximum(_length(outward), 1e-30)
+    outward = cross(bottom_after - bottom, normals + np.roll(normals, -1, axis=1))
+    outward /= np.maximum(length(outward), 1e-30)
     corners = np.stack([bottom, bottom_after, top_after, top], axis=2).reshape(-1, 3)
     quads = np.arange(0, len(corners), 4)[:, None, None] + np.array([(0, 1, 2), (0, 2, 3)])
     return Solid(corners, np.repeat(outward.reshape(-1, 3), 4, axis=0), quads.reshape(-1, 3))
-
-
-@lru_cache(maxsize=8)
-def _box_template(steps: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Directions on the sphere, signs of the core corner and faces of a rounded unit box."""
-    bend = np.tan(np.linspace(0, np.pi / 4, steps + 1))
-    slope = np.r_[-bend[::-1], bend]
-    side = np.r_[-np.ones(steps + 1), np.ones(steps + 1)]
-    u, v = (grid.ravel() for grid in np.meshgrid(slope, slope))
-    su, sv = (grid.ravel() for grid in np.meshgrid(side, side))
-    one = np.ones_like(u)
-    grid = _grid_faces(len(slope), len(slope))
-    directions: list[np.ndarray] = []
-    signs: list[np.ndarray] = []
-    faces: list[np.ndarray] = []
-    for axis in range(3):
-        for sign in (1.0, -1.0):
-            order = [(axis + 1) % 3, (axis + 2) % 3, axis]
-            directions.append(np.stack([u, v, sign * one])[np.argsort(order)].T)
-            signs.append(np.stack([su, sv, sign * one])[np.argsort(order)].T)
-            faces.append((grid if sign > 0 else grid[:, ::-1]) + len(faces) * len(u))
-    out = np.vstack(directions)
-    return out / _length(out), np.vstack(signs), np.vstack(faces)
-
-
-@lru_cache(maxsize=8)
-def _icosphere(level: int) -> tuple[np.ndarray, np.ndarray]:
-    g = (1 + 5**0.5) / 2
-    points = np.array([p for s in (1, -1) for t in (g, -g) for p in ((0, s, t), (s, t, 0), (t, 0, s))], float)
-    gaps = np.linalg.norm(points[:, None] - points[None], axis=-1)
-    near = (gaps > 0) & (gaps < 2.1)
-    faces = np.array(
-        [
-            (a, b, c)
-            for a in range(12)
-            for b in range(a)
-            for c in range(b)
-            if near[a, b] and near[b, c] and near[a, c]
-        ]
-    )
-    flip = np.einsum("fi,fi->f", _facing(points, faces), points[faces[:, 0]]) < 0
-    faces[flip] = faces[flip][:, ::-1]
-    for _ in range(level):
-        points, faces = _split(points, faces)
-    return points / _length(points), faces
-
-
-def _split(points: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Each triangle into four, new points on the sphere."""
-    points = points / _length(points)
-    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
-    unique, where = np.unique(edges, axis=0, return_inverse=True)
-    ab, bc, ca = where.reshape(3, -1) + len(points)
-    a, b, c = faces.T
-    middle = points[unique].sum(1)
-    split = np.concatenate([np.stack(t, 1) for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
-    return np.vstack([points, middle / _length(middle)]), split

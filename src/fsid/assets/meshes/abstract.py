@@ -20,9 +20,9 @@ from fsid.assets.solids import (
     rotation_matrix,
     sheet,
     sheets,
-    smooth_normals,
     tubes,
 )
+from fsid.assets.surfaces import smooth_normals
 
 
 @mesh_family("blob")

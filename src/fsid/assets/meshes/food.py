@@ -6,7 +6,8 @@ import numpy as np
 
 from fsid.assets.forms import plate, scatter_rand, sunflower, turns_to
 from fsid.assets.registry import Parts, mesh_family
-from fsid.assets.solids import Solid, ball, ball_directions, copies, cylinder, lathe, smooth_normals, sweep
+from fsid.assets.solids import Solid, ball, ball_directions, copies, cylinder, lathe, sweep
+from fsid.assets.surfaces import smooth_normals
 
 
 @mesh_family("fruit")

@@ -15,10 +15,10 @@ from fsid.assets.solids import (
     lathe,
     rotation_matrix,
     sheet,
-    smooth_normals,
     sweep,
     tubes,
 )
+from fsid.assets.surfaces import smooth_normals
 
 
 @mesh_family("stones")

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from fsid.assets.registry import Parts, mesh_family
-from fsid.assets.solids import Solid, ball, ball_directions, box, cone, sheet, smooth_normals, sweep
+from fsid.assets.solids import Solid, ball, ball_directions, box, cone, sheet, sweep
+from fsid.assets.surfaces import smooth_normals
 
 
 @mesh_family("couch")
