@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from rich.console import Console
 from rich.table import Table
@@ -12,6 +12,9 @@ from tyro.conf import Positional
 
 from fsid.cli.arguments import Output
 from fsid.cli.progress import progress_bar
+
+if TYPE_CHECKING:
+    from fsid.sensor.camera_fit import Calibration
 
 
 def calibrate(
@@ -80,10 +83,15 @@ def calibrate(
         write_atomically(plot, picture)
     for note in found.notes:
         Console(stderr=True, quiet=quiet).print(Text(f"note: {note}"), soft_wrap=True)
+    Console(quiet=quiet).print(_table(found))
+
+
+def _table(found: Calibration) -> Table:
+    """The lines that were fitted, a row per ISO and CFA site."""
     table = Table("ISO", "site", "black (DN)", "k (DN)", "±", "sigma2 (DN²)", "±", title=found.profile.camera)
     for level, fit in zip(found.profile.iso, found.fits, strict=True):
         for site, label in enumerate(("R", "Gr", "Gb", "B") if len(fit.k_dn) == 4 else ("mono",)):
             values = (fit.k_dn, fit.k_dn_error, fit.sigma2_dn, fit.sigma2_dn_error)
             figures = [f"{value[site]:.4g}" for value in values]
             table.add_row(f"{level:g}", label, f"{fit.black[site]:.2f}", *figures)
-    Console(quiet=quiet).print(table)
+    return table

@@ -61,8 +61,8 @@ def denoise(
     sources = find_raws(input, bare=layout is not None) if input.is_dir() else None
     network = load_model(model, backend)
     console = Console(stderr=True)
-    with progress_bar("denoising", "tiles" if sources is None else "files", quiet=quiet) as progress:
-        if sources is not None:
+    if sources is not None:
+        with progress_bar("denoising", "files", quiet=quiet) as progress:
             denoise_folder(
                 sources,
                 output,
@@ -74,7 +74,8 @@ def denoise(
                 progress=progress,
                 failed=lambda error: console.print(Text(f"fsid: {error}", style="bold red"), soft_wrap=True),
             )
-            return
+        return
+    with progress_bar("denoising", "tiles", quiet=quiet) as progress:
         noise = denoise_file(
             input,
             output,

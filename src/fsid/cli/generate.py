@@ -17,7 +17,7 @@ from fsid.cli.progress import progress_bar
 from fsid.errors import FsidError
 
 if TYPE_CHECKING:
-    from fsid.dataset import Estimate
+    from fsid.dataset import GenerateConfig, Workforce
 
 Variant = Literal["objects", "materials", "objects-materials", "full"]
 Task = Literal["denoise", "super-resolution", "deblur", "burst"]
@@ -77,8 +77,7 @@ def generate(
         dry_run: Measure a few pairs, print the estimated time, size and number of shards, and write nothing.
         quiet: No progress bar.
     """
-    from fsid.dataset import Workforce, dataset_config, estimate, generate_config, make_only
-    from fsid.dataset import generate as generate_dataset
+    from fsid.dataset import Workforce, dataset_config, generate_config, make_only
 
     given = {
         "width": width,
@@ -103,11 +102,20 @@ def generate(
     if not settings.images:
         read_mesh_folders(settings.scene, quiet=quiet)
     if dry_run:
-        costs = estimate(settings, count=count, seed=seed, workforce=workforce)
-        Console().print(_plan(out, costs, workers), soft_wrap=True)
-        return
+        Console().print(_plan(out, settings, count, seed, workforce), soft_wrap=True)
+    else:
+        made = _make(out, settings, count, seed, workforce, quiet=quiet)
+        console.print(f"{out}: {count} pairs, {made} of them new")
+
+
+def _make(
+    out: Path, settings: GenerateConfig, count: int, seed: int, workforce: Workforce, *, quiet: bool
+) -> int:
+    """Generate behind a progress bar; how many pairs are new."""
+    from fsid.dataset import generate as generate_dataset
+
     with progress_bar("pairs", "pairs", quiet=quiet) as progress:
-        made = generate_dataset(
+        return generate_dataset(
             out,
             settings,
             count=count,
@@ -117,16 +125,19 @@ def generate(
             lost=progress.failed,
             command=shlex.join(["fsid", *sys.argv[1:]]),
         )
-    console.print(f"{out}: {count} pairs, {made} of them new")
 
 
-def _plan(out: Path, costs: Estimate, workers: int) -> str:
+def _plan(out: Path, settings: GenerateConfig, count: int, seed: int, workforce: Workforce) -> str:
+    """What a dry run says: time, size and number of shards, from a few pairs."""
+    from fsid.dataset import estimate
+
+    costs = estimate(settings, count=count, seed=seed, workforce=workforce)
     hours, minutes = divmod(round(costs.seconds / 60), 60)
     folder = next(path for path in (out, *out.absolute().parents) if path.exists())
     free = shutil.disk_usage(folder).free
     return (
         f"{out}: {costs.pairs} pairs in {costs.shards} shards\n"
-        f"time   {hours} h {minutes:02d} min with {workers} workers "
+        f"time   {hours} h {minutes:02d} min with {workforce.workers} workers "
         f"({costs.seconds / costs.pairs:.3g} s per pair)\n"
         f"size   {costs.bytes / 1e9:.3g} GB ({costs.bytes / costs.pairs / 1e6:.3g} MB per pair), "
         f"{free / 1e9:.3g} GB are free\n"

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from rich.console import Console
 from rich.table import Table
@@ -11,6 +12,10 @@ from tyro.conf import Positional
 
 from fsid.cli.arguments import Output
 from fsid.cli.progress import progress_bar
+from fsid.errors import FsidError
+
+if TYPE_CHECKING:
+    from fsid.evaluate.bursts import TruthQuality
 
 DEFAULT_ISOS = (800, 1600, 3200, 6400)
 
@@ -53,12 +58,10 @@ def testset(
         seed: Seed of drawing, white balance, colour matrix and noise.
         quiet: No progress bar.
     """
-    from fsid.errors import FsidError
     from fsid.evaluate import burst_testset, photo_testset, simulated_testset
 
+    _check(source, folders)
     if source == "simulate":
-        if folders:
-            raise FsidError(f"fsid testset simulate: takes no folder, but {folders[0]} was given")
         with progress_bar("materials", "pictures", quiet=quiet) as progress:
             simulated_testset(
                 output,
@@ -74,28 +77,38 @@ def testset(
                 progress=progress,
             )
         return
-    if not folders:
-        raise FsidError(f"fsid testset {source}: name at least one folder")
     if source == "from-bursts":
-        if len(folders) > 1:
-            raise FsidError("fsid testset from-bursts: give one folder, <scene>/<level>/frames inside")
         with progress_bar("bursts", "bursts", quiet=quiet) as progress:
             _, found = burst_testset(folders[0], output, camera=camera, frames=frames, progress=progress)
-        table = Table("burst", "frames", "left out", "outliers", "flicker", "shift px", "truth PSNR dB")
-        for q in found:
-            table.add_row(
-                f"{q.image}/{q.level}",
-                str(q.frames),
-                str(q.left_out),
-                f"{q.outliers:.3%}",
-                f"{q.flicker:.2%}",
-                f"{q.shift_px:.0f}",
-                f"{q.psnr:.1f}",
-            )
-        Console().print(table)
+        Console().print(_table(found))
         return
     isos = iso if iso or lux else DEFAULT_ISOS
     with progress_bar("photographs", "photographs", quiet=quiet) as progress:
         photo_testset(
             folders, output, camera=camera or "pixel6", isos=isos, luxes=lux, seed=seed, progress=progress
         )
+
+
+def _check(source: str, folders: tuple[Path, ...]) -> None:
+    if source == "simulate" and folders:
+        raise FsidError(f"fsid testset simulate: takes no folder, but {folders[0]} was given")
+    if source != "simulate" and not folders:
+        raise FsidError(f"fsid testset {source}: name at least one folder")
+    if source == "from-bursts" and len(folders) > 1:
+        raise FsidError("fsid testset from-bursts: give one folder, <scene>/<level>/frames inside")
+
+
+def _table(found: Sequence[TruthQuality]) -> Table:
+    """How good the truths are, a row per burst."""
+    table = Table("burst", "frames", "left out", "outliers", "flicker", "shift px", "truth PSNR dB")
+    for q in found:
+        table.add_row(
+            f"{q.image}/{q.level}",
+            str(q.frames),
+            str(q.left_out),
+            f"{q.outliers:.3%}",
+            f"{q.flicker:.2%}",
+            f"{q.shift_px:.0f}",
+            f"{q.psnr:.1f}",
+        )
+    return table

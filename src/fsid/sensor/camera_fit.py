@@ -31,6 +31,7 @@ UNCERTAIN = 0.02  # relative standard error of k that deserves a note
 _METHOD = "fsid calibrate: weighted line through pooled temporal variances per CFA site (sensor/calibrate.py)"
 
 Progress = Callable[[int, int], None]
+_Pooled = tuple[Samples, ...]
 
 
 @dataclass(frozen=True)
@@ -108,7 +109,6 @@ class _Reader:
 
 
 def _fit_iso(reader: _Reader, iso: float, tie_greens: bool) -> NoiseFit:
-    camera = reader.found.camera
     lights = [frame for frame in reader.found.frames if frame.iso == iso]
     darks = [frame for frame in reader.found.dark if frame.iso == iso]
     if len(lights) + len(darks) < MIN_FRAMES:
@@ -116,28 +116,48 @@ def _fit_iso(reader: _Reader, iso: float, tie_greens: bool) -> NoiseFit:
             f"{lights[0].path}: only {len(lights) + len(darks)} frames of ISO {iso:g}; a calibration needs "
             f"at least {MIN_FRAMES}, and 20 or more to be good"
         )
+    black, pooled = _pool_dark(reader, iso, darks)
+    if black is None:
+        raise FsidError(
+            f"{lights[0].path}: ISO {iso:g} has no dark frames and no black level; "
+            f"give --dark frames or --black-level"
+        )
+    pooled += _pool_lights(reader, iso, lights, black)
+    try:
+        return fit_samples(pooled, black, tie_greens=tie_greens)
+    except FsidError as error:
+        raise FsidError(f"{lights[0].path}: ISO {iso:g}: {error}") from error
+
+
+def _pool_dark(reader: _Reader, iso: float, frames: list[Frame]) -> tuple[np.ndarray | None, list[_Pooled]]:
+    """Black level per site in DN, from the file where there are no frames, and what the frames pool to.
+
+    The shortest exposure is the black level; longer ones are dark current above it.
+    """
+    camera = reader.found.camera
     black = None if camera.black_level is None else _per_site(camera.black_level, camera.cfa)
-    pooled: list[tuple[Samples, ...]] = []
-    fixed_dn2 = 0.0
-    for number, burst in enumerate(bursts(darks)):
+    pooled: list[_Pooled] = []
+    for number, burst in enumerate(bursts(frames)):
         stats = reader.statistics(burst, dark=True)
         _check_dark(stats, burst[0].path, camera.black_level, camera.white_level)
         if (finding := dark_finding(stats, iso, burst[0].exposure_s)) is not None:
             reader.dark.append(finding)
-            fixed_dn2 = finding.fixed_dn2
         if stats.zero_share > CUT_OFF:
             reader.cut_off.append(iso)
         samples, levels = pool_dark(stats, camera.cfa, camera.white_level, black if number > 0 else None)
         if number == 0:
             black = levels
         pooled.append(samples)
-    if black is None:
-        raise FsidError(
-            f"{lights[0].path}: ISO {iso:g} has no dark frames and no black level; "
-            f"give --dark frames or --black-level"
-        )
+    return black, pooled
+
+
+def _pool_lights(reader: _Reader, iso: float, frames: list[Frame], black: np.ndarray) -> list[_Pooled]:
+    """What the lit bursts pool to, a burst each; at least one has to be usable in every site."""
+    camera = reader.found.camera
+    fixed_dn2 = next((found.fixed_dn2 for found in reversed(reader.dark) if found.iso == iso), 0.0)
+    pooled: list[_Pooled] = []
     usable = False
-    for burst in bursts(lights):
+    for burst in bursts(frames):
         stats = reader.statistics(burst)
         try:
             samples = pool(stats, camera.cfa, black, camera.white_level)
@@ -152,13 +172,10 @@ def _fit_iso(reader: _Reader, iso: float, tie_greens: bool) -> NoiseFit:
         pooled.append(samples)
     if not usable:
         raise FsidError(
-            f"{lights[0].path}: every burst of ISO {iso:g} is saturated or without light; "
+            f"{frames[0].path}: every burst of ISO {iso:g} is saturated or without light; "
             f"expose so that the scene stays below 70 % of the range"
         )
-    try:
-        return fit_samples(pooled, black, tie_greens=tie_greens)
-    except FsidError as error:
-        raise FsidError(f"{lights[0].path}: ISO {iso:g}: {error}") from error
+    return pooled
 
 
 def _check_dark(stats: TemporalStatistics, path: Path, black: int | None, white: int) -> None:
