@@ -28,20 +28,24 @@ def monitor(rng: np.random.Generator) -> Parts:
 @mesh_family("television")
 def television(rng: np.random.Generator) -> Parts:
     """Television: a wide flat one on two feet, or an old one with a bulged tube, knobs and antenna."""
-    if rng.random() < 0.6:
-        x = rng.uniform(0.8, 1.5)
-        z, rim, lift = x * rng.uniform(0.55, 0.6), rng.uniform(0.008, 0.025), rng.uniform(0.05, 0.1)
-        shell, display = _panel(x, z, rim, rng.uniform(0.025, 0.05))
-        feet = []
-        for s in (-1, 1):
-            legs = np.array([(0, -0.14, 0.008), (0, 0.0, lift + 0.02), (0, 0.14, 0.008)])
-            fine = np.linspace(0, 2, 11)
-            path = np.c_[
-                0 * fine, np.interp(fine, range(3), legs[:, 1]), np.interp(fine, range(3), legs[:, 2])
-            ]
-            feet.append(sweep(path, 0.008, 8).at(s * rng.uniform(0.25, 0.42) * x))
-        front = [s.at(z=lift) for s in shell]
-        return {"plastic_shell": front, "screen": [display.at(z=lift)], "feet": feet}
+    return _flat_television_rand(rng) if rng.random() < 0.6 else _tube_television_rand(rng)
+
+
+def _flat_television_rand(rng: np.random.Generator) -> Parts:
+    x = rng.uniform(0.8, 1.5)
+    z, rim, lift = x * rng.uniform(0.55, 0.6), rng.uniform(0.008, 0.025), rng.uniform(0.05, 0.1)
+    shell, display = _panel(x, z, rim, rng.uniform(0.025, 0.05))
+    feet = []
+    for s in (-1, 1):
+        legs = np.array([(0, -0.14, 0.008), (0, 0.0, lift + 0.02), (0, 0.14, 0.008)])
+        fine = np.linspace(0, 2, 11)
+        path = np.c_[0 * fine, np.interp(fine, range(3), legs[:, 1]), np.interp(fine, range(3), legs[:, 2])]
+        feet.append(sweep(path, 0.008, 8).at(s * rng.uniform(0.25, 0.42) * x))
+    front = [s.at(z=lift) for s in shell]
+    return {"plastic_shell": front, "screen": [display.at(z=lift)], "feet": feet}
+
+
+def _tube_television_rand(rng: np.random.Generator) -> Parts:
     x, y, z = rng.uniform(0.35, 0.6), rng.uniform(0.25, 0.4), rng.uniform(0.3, 0.45)
     wide, tall = x * rng.uniform(0.62, 0.75), z * 0.8
     case = [box(x, y, z, rng.uniform(0.008, 0.04), 4).at(z=0.03)]

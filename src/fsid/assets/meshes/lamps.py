@@ -68,37 +68,8 @@ def desk_lamp(rng: np.random.Generator) -> Parts:
 def pendant_lamp(rng: np.random.Generator) -> Parts:
     """Hanging lamp: ceiling rose, cord, and a globe, a bell, a ribbed paper lantern or stacked rings."""
     cord, size = rng.uniform(0.15, 0.7), rng.uniform(0.09, 0.24)
-    kind = int(rng.integers(4))
+    shades = _shades_rand(rng, size)
     t = np.linspace(0, 1, 30)
-    if kind == 0:
-        angle = np.pi * (0.08 + 0.84 * t)
-        squash = rng.uniform(0.7, 1.3)
-        outer, z = size * np.sin(angle), size * squash * (1 - np.cos(angle))
-        shades = [hollow(outer, z - z[0], 0.002, bottom=False, segments=44)]
-    elif kind == 1:
-        rise = rng.uniform(0.4, 1.2) * size * 2
-        outer = size * (1 - 0.85 * t ** rng.uniform(0.7, 3))
-        shades = [hollow(outer, rise * t, 0.002, bottom=False, segments=44)]
-    elif kind == 2:
-        ribs = int(rng.integers(7, 14))
-        angle = np.pi * (0.1 + 0.8 * np.linspace(0, 1, 4 * ribs + 1))
-        bulge = 1 - rng.uniform(0.02, 0.07) * np.abs(np.sin(np.arange(4 * ribs + 1) * np.pi / 4))
-        z = -size * 0.9 * np.cos(angle)
-        shades = [hollow(size * np.sin(angle) * bulge, z - z[0], 0.0012, bottom=False, segments=36)]
-    else:
-        rings = int(rng.integers(3, 8))
-        tall = 2 * size / rings
-        widths = size * (0.5 + 0.5 * np.sin(np.pi * (np.arange(rings) + rng.uniform(0.3, 1)) / rings))
-        shades = [
-            hollow(
-                w * np.linspace(1, 0.75, 4),
-                tall * 0.8 * np.linspace(0, 1, 4),
-                0.002,
-                bottom=False,
-                segments=36,
-            ).at(z=k * tall)
-            for k, w in enumerate(widths)
-        ]
     top = max(float(s.vertices[:, 2].max()) for s in shades)
     sag = rng.normal(0, 0.03) * np.sin(np.pi * t)
     flex = sweep(np.c_[sag, 0 * t, top * 0.55 + t * (cord + top * 0.45)], 0.0028, 8)
@@ -110,6 +81,40 @@ def pendant_lamp(rng: np.random.Generator) -> Parts:
         "socket": [socket, rose],
         "bulb": [ball(0.028, 3).at(z=0.43 * top)],
     }
+
+
+def _shades_rand(rng: np.random.Generator, size: float) -> list[Solid]:
+    """A globe, a bell, a ribbed paper lantern or stacked rings, open below."""
+    kind = int(rng.integers(4))
+    t = np.linspace(0, 1, 30)
+    if kind == 0:
+        angle = np.pi * (0.08 + 0.84 * t)
+        squash = rng.uniform(0.7, 1.3)
+        outer, z = size * np.sin(angle), size * squash * (1 - np.cos(angle))
+        return [hollow(outer, z - z[0], 0.002, bottom=False, segments=44)]
+    if kind == 1:
+        rise = rng.uniform(0.4, 1.2) * size * 2
+        outer = size * (1 - 0.85 * t ** rng.uniform(0.7, 3))
+        return [hollow(outer, rise * t, 0.002, bottom=False, segments=44)]
+    if kind == 2:
+        ribs = int(rng.integers(7, 14))
+        angle = np.pi * (0.1 + 0.8 * np.linspace(0, 1, 4 * ribs + 1))
+        bulge = 1 - rng.uniform(0.02, 0.07) * np.abs(np.sin(np.arange(4 * ribs + 1) * np.pi / 4))
+        z = -size * 0.9 * np.cos(angle)
+        return [hollow(size * np.sin(angle) * bulge, z - z[0], 0.0012, bottom=False, segments=36)]
+    rings = int(rng.integers(3, 8))
+    tall = 2 * size / rings
+    widths = size * (0.5 + 0.5 * np.sin(np.pi * (np.arange(rings) + rng.uniform(0.3, 1)) / rings))
+    return [
+        hollow(
+            w * np.linspace(1, 0.75, 4),
+            tall * 0.8 * np.linspace(0, 1, 4),
+            0.002,
+            bottom=False,
+            segments=36,
+        ).at(z=k * tall)
+        for k, w in enumerate(widths)
+    ]
 
 
 @mesh_family("candle")

@@ -138,19 +138,24 @@ def crate(rng: np.random.Generator) -> Parts:
     ]
     parts = {"wood_slats": wood, "wood_posts": post, "metal_nails": nails}
     if rng.random() < 0.5:
-        size = rng.uniform(0.03, 0.045)
-        t = np.linspace(0, 1, 14)
-        shape = size * np.where(t < 0.6, 1.0, 1 - 0.68 * np.clip((t - 0.6) / 0.2, 0, 1))
-        bottle = hollow(shape, t * z * rng.uniform(0.9, 1.5), 0.003, segments=24)
-        nx, ny = int((x - 0.06) / (2.1 * size)), int((y - 0.06) / (2.1 * size))
-        places = [
-            ((i - (nx - 1) / 2) * 2.1 * size, (j - (ny - 1) / 2) * 2.1 * size)
-            for i in range(nx)
-            for j in range(ny)
-        ]
-        keep = rng.permutation(len(places))[: min(8, len(places))]
-        parts["glass"] = [bottle.at(places[k][0], places[k][1], 0.011) for k in keep]
+        parts["glass"] = _bottles_rand(rng, x, y, z)
     return {name: solids for name, solids in parts.items() if solids}
+
+
+def _bottles_rand(rng: np.random.Generator, x: float, y: float, z: float) -> list[Solid]:
+    """Up to eight bottles of one kind in the places of a crate, x by y wide and z high."""
+    size = rng.uniform(0.03, 0.045)
+    t = np.linspace(0, 1, 14)
+    shape = size * np.where(t < 0.6, 1.0, 1 - 0.68 * np.clip((t - 0.6) / 0.2, 0, 1))
+    bottle = hollow(shape, t * z * rng.uniform(0.9, 1.5), 0.003, segments=24)
+    nx, ny = int((x - 0.06) / (2.1 * size)), int((y - 0.06) / (2.1 * size))
+    places = [
+        ((i - (nx - 1) / 2) * 2.1 * size, (j - (ny - 1) / 2) * 2.1 * size)
+        for i in range(nx)
+        for j in range(ny)
+    ]
+    keep = rng.permutation(len(places))[: min(8, len(places))]
+    return [bottle.at(places[k][0], places[k][1], 0.011) for k in keep]
 
 
 @mesh_family("parcel")

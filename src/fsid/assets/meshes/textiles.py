@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from fsid.assets.registry import Parts, mesh_family
@@ -100,6 +102,22 @@ def rug(rng: np.random.Generator) -> Parts:
         )
         for s in (-1, 1)
     ]
+    return {
+        "cloth_field": [field],
+        "cloth_border": border,
+        "yarn_fringe": _fringe_rand(rng, x, y, thick, lay),
+    }
+
+
+def _fringe_rand(
+    rng: np.random.Generator,
+    x: float,
+    y: float,
+    thick: float,
+    lay: Callable[[np.ndarray, np.ndarray], np.ndarray],
+) -> list[Solid]:
+    """Threads at the two short ends of a rug, x by y wide, that `lay` places where it lies."""
+    a, b = x / 2, y / 2
     count, reach = int(x / 0.007), rng.uniform(0.02, 0.06)
     s = np.linspace(0, 1, 5)
     threads = []
@@ -114,7 +132,7 @@ def rug(rng: np.random.Generator) -> Parts:
         path[:, :, 0] += u - np.clip(u, -a, a)
         path[:, :, 2] = np.maximum(path[:, :, 2], 0.001)
         threads.append(tubes(path, np.array((1, 1, 0.9, 0.8, 0.6)) * rng.uniform(0.0012, 0.002), 4))
-    return {"cloth_field": [field], "cloth_border": border, "yarn_fringe": threads}
+    return threads
 
 
 @mesh_family("towels")
@@ -218,16 +236,19 @@ def stuffed_toy(rng: np.random.Generator) -> Parts:
         ball(0.13 * head, 2).stretched(1.3, 0.8, 0.9).at(0, -0.1 * body - 1.12 * head, top + 0.62 * head)
     )
     parts = {"yarn_fur": soft, "cloth_inner": inner, "plastic_eyes": eyes}
-    if rng.random() < 0.6:
-        a = np.linspace(0, 2 * np.pi, 40, endpoint=False)
-        wide = 0.62 * body
-        scarf = np.c_[
-            wide * np.cos(a),
-            wide * 0.9 * np.sin(a) - 0.05 * body,
-            top + 0.04 * body + 0.03 * body * np.sin(3 * a),
-        ]
-        parts["cloth_scarf"] = [sweep(scarf, 0.17 * body, 10, closed=True)]
-    return parts
+    return parts | ({"cloth_scarf": [_scarf(body, top)]} if rng.random() < 0.6 else {})
+
+
+def _scarf(body: float, top: float) -> Solid:
+    """Around the neck of a body of that radius, at height `top`."""
+    a = np.linspace(0, 2 * np.pi, 40, endpoint=False)
+    wide = 0.62 * body
+    path = np.c_[
+        wide * np.cos(a),
+        wide * 0.9 * np.sin(a) - 0.05 * body,
+        top + 0.04 * body + 0.03 * body * np.sin(3 * a),
+    ]
+    return sweep(path, 0.17 * body, 10, closed=True)
 
 
 def _ribbon(line: np.ndarray, width: float, thick: float) -> Solid:

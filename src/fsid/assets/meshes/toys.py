@@ -74,11 +74,8 @@ def toy_car(rng: np.random.Generator) -> Parts:
     soft = rng.uniform(0.15, 0.45) * z
     body = [box(x, y, z, soft, 4).at(z=wheel)]
     cabin, start = x * (1 - nose - tail), x * (-0.5 + nose)
-    lean_front, lean_back, roof = (
-        rng.uniform(0.1, 0.5) * cabin,
-        rng.uniform(0, 0.35) * cabin,
-        rng.uniform(0.7, 1.3) * z,
-    )
+    lean_front, lean_back = rng.uniform(0.1, 0.5) * cabin, rng.uniform(0, 0.35) * cabin
+    roof = rng.uniform(0.7, 1.3) * z
 
     def shear(p: np.ndarray) -> np.ndarray:
         t = np.clip(p[:, 2] / roof, 0, 1)
@@ -89,24 +86,14 @@ def toy_car(rng: np.random.Generator) -> Parts:
     house = box(cabin, 0.92 * y, roof, 0.004, 3).warped(shear)
     body.append(house.at(z=wheel + z - 0.0006))
     middle = start + cabin / 2 + (lean_front - lean_back) / 4
-    panes = [
-        box(0.66 * (cabin - lean_front), 0.0025, 0.5 * roof, 0.0008, 1)
-        .turned(x_deg=-s * 5)
-        .at(middle, s * 0.435 * y, wheel + z + 0.25 * roof)
-        for s in (-1, 1)
-    ]
-    tilt = np.degrees(np.arctan2(lean_front, roof))
-    panes.append(
-        box(0.0025, 0.7 * y, 0.62 * np.hypot(roof, lean_front), 0.0008, 1)
-        .turned(y_deg=tilt)
-        .at(start + 0.2 * lean_front, 0, wheel + z + 0.2 * roof)
-    )
+    side = box(0.66 * (cabin - lean_front), 0.0025, 0.5 * roof, 0.0008, 1)
+    panes = [side.turned(x_deg=-s * 5).at(middle, s * 0.435 * y, wheel + z + 0.25 * roof) for s in (-1, 1)]
+    windscreen = box(0.0025, 0.7 * y, 0.62 * np.hypot(roof, lean_front), 0.0008, 1)
+    windscreen = windscreen.turned(y_deg=np.degrees(np.arctan2(lean_front, roof)))
+    panes.append(windscreen.at(start + 0.2 * lean_front, 0, wheel + z + 0.2 * roof))
     if truck:
-        body.append(
-            box(tail * x * 0.98, 0.97 * y, rng.uniform(0.4, 1.3) * roof, 0.002, 2).at(
-                0.5 * x * (1 - tail), 0, wheel + z - 0.001
-            )
-        )
+        bed = box(tail * x * 0.98, 0.97 * y, rng.uniform(0.4, 1.3) * roof, 0.002, 2)
+        body.append(bed.at(0.5 * x * (1 - tail), 0, wheel + z - 0.001))
     tyres, hubs = _wheels(x * np.array((-0.32, 0.16, 0.36) if truck else (-0.31, 0.31)), y, wheel)
     lamps = [ball(0.12 * z + 0.001, 2).at(-x / 2 + 0.001, s * 0.34 * y, wheel + 0.55 * z) for s in (-1, 1)]
     bumpers = [box(0.006, 0.96 * y, 0.2 * z, 0.0015).at(s * x / 2, 0, wheel + 0.1 * z) for s in (-1, 1)]

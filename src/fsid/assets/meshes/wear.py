@@ -38,28 +38,30 @@ def shoe(rng: np.random.Generator) -> Parts:
     parts["cloth_collar"] = [sweep(collar, 0.0065, 10, closed=True), inside]
     if rng.random() < 0.7:
         rows = int(rng.integers(3, 7))
-        laces = []
-        for k in range(rows):
-            t = 0.4 + 0.27 * k / rows
-            z = float(np.interp(t, s, high + lift)) + 0.0125
-            wide = 0.3 * float(np.interp(t, s, half))
-            across = np.linspace(-1, 1, 7)
-            slant = 0.04 * length * (across if k % 2 else -across) / 2
-            laces.append(np.c_[t * length + slant, wide * across, z - 0.25 * wide * across**2])
-        parts["yarn_laces"] = [tubes(np.array(laces), 0.0018, 6)]
-        u = np.linspace(0, 1, 40)[:, None]
-        for side in (-1, 1):
-            loop = np.c_[
-                0.014 * np.sin(2 * np.pi * u),
-                side * 0.028 * np.sin(np.pi * u),
-                -0.012 * u * np.sin(np.pi * u),
-            ]
-            parts["yarn_laces"].append(sweep(loop + laces[0][3] + (0, 0, 0.002), 0.0017, 6))
+        t = 0.4 + 0.27 * np.arange(rows) / rows
+        parts["yarn_laces"] = _laces(length, t, np.interp(t, s, high + lift), np.interp(t, s, half))
     gap, turn = 0.46 * length, -abs(rng.normal(0, 10))
     pair = {name: list(solids) for name, solids in parts.items()}
     for name, solids in parts.items():
         pair[name] += [_mirrored(p).turned(z_deg=turn).at(y=-gap) for p in solids]
     return pair
+
+
+def _laces(length: float, t: np.ndarray, high: np.ndarray, half: np.ndarray) -> list[Solid]:
+    """Rows of laces at shares `t` of the length, `high` above the floor on an upper `half` as wide; a bow."""
+    laces = []
+    across = np.linspace(-1, 1, 7)
+    for k, (at, z, wide) in enumerate(zip(t, high + 0.0125, 0.3 * half, strict=True)):
+        slant = 0.04 * length * (across if k % 2 else -across) / 2
+        laces.append(np.c_[at * length + slant, wide * across, z - 0.25 * wide * across**2])
+    solids = [tubes(np.array(laces), 0.0018, 6)]
+    u = np.linspace(0, 1, 40)[:, None]
+    for side in (-1, 1):
+        loop = np.c_[
+            0.014 * np.sin(2 * np.pi * u), side * 0.028 * np.sin(np.pi * u), -0.012 * u * np.sin(np.pi * u)
+        ]
+        solids.append(sweep(loop + laces[0][3] + (0, 0, 0.002), 0.0017, 6))
+    return solids
 
 
 @mesh_family("hat")
