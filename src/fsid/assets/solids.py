@@ -20,12 +20,9 @@ from itertools import pairwise
 import numpy as np
 
 from fsid.assets.mesh import Mesh
-from fsid.assets.surfaces import areas, cross, grid_faces, length, repeated, smooth_normals
+from fsid.assets.surfaces import MIN_AREA_M2, cross, face_areas, grid_faces, lengths, repeated, smooth_normals
 from fsid.assets.tube_frames import frames_along, tangents_of, with_caps
 from fsid.assets.unit_shapes import box_template, icosphere
-
-MIN_AREA_M2 = 1e-10
-"""Triangles smaller than this are dropped: 10 um squared, below anything that a pixel can see."""
 
 
 def rotation_matrix(x_deg: float = 0.0, y_deg: float = 0.0, z_deg: float = 0.0) -> np.ndarray:
@@ -61,7 +58,7 @@ class Solid:
     def stretched(self, x: float, y: float, z: float) -> Solid:
         """Scaled per axis by positive factors; normals by the inverse transpose."""
         normals = self.normals / (x, y, z)
-        return Solid(self.vertices * (x, y, z), normals / length(normals), self.faces)
+        return Solid(self.vertices * (x, y, z), normals / lengths(normals), self.faces)
 
     def warped(self, warp: Callable[[np.ndarray], np.ndarray]) -> Solid:
         """Bent by a smooth map (V, 3) -> (V, 3) that keeps orientation; normals by the cofactors of its
@@ -70,7 +67,7 @@ class Solid:
         a, b, c = ((warp(self.vertices + step) - moved) / 1e-6 for step in 1e-6 * np.eye(3))
         x, y, z = self.normals.T[:, :, None]
         normals = x * cross(b, c) + y * cross(c, a) + z * cross(a, b)
-        return Solid(moved, normals / np.maximum(length(normals), 1e-30), self.faces)
+        return Solid(moved, normals / np.maximum(lengths(normals), 1e-30), self.faces)
 
 
 def join(solids: Sequence[Solid]) -> Solid:
@@ -91,7 +88,7 @@ def assemble(parts: Mapping[str, Sequence[Solid]]) -> Mesh:
     face_parts = np.repeat(owner, [len(s.faces) for s in solids])
     low, high = whole.vertices.min(0), whole.vertices.max(0)
     vertices = (whole.vertices - ((low + high) * (0.5, 0.5, 0) + low * (0, 0, 1))).astype(np.float32)
-    keep = areas(vertices.astype(np.float64), whole.faces) > MIN_AREA_M2
+    keep = face_areas(vertices.astype(np.float64), whole.faces) > MIN_AREA_M2
     return Mesh(
         vertices=vertices,
         normals=whole.normals.astype(np.float32),
@@ -115,7 +112,7 @@ def lathe(profile: Sequence[Sequence[float]], segments: int = 32, crease_deg: fl
     points = np.asarray(profile, dtype=float)
     points = points[np.r_[True, np.hypot(*np.diff(points, axis=0).T) > 1e-7]]
     heading = np.diff(points, axis=0)
-    heading /= length(heading)
+    heading /= lengths(heading)
     bend = np.degrees(np.arccos(np.clip((heading[1:] * heading[:-1]).sum(1), -1, 1)))
     cuts = [0, *(np.flatnonzero(bend > crease_deg) + 1), len(points) - 1]
     return join([_revolved(points[a : b + 1], heading[a:b], segments) for a, b in pairwise(cuts)])
@@ -196,12 +193,12 @@ def copies(solid: Solid, turns: np.ndarray, places: np.ndarray) -> Solid:
     vertices = np.einsum("nij,vj->nvi", turns, solid.vertices) + places[:, None]
     normals = np.einsum("nij,vj->nvi", turns, solid.normals)
     faces = solid.faces + np.arange(len(turns))[:, None, None] * len(solid.vertices)
-    return Solid(vertices.reshape(-1, 3), (normals / length(normals)).reshape(-1, 3), faces.reshape(-1, 3))
+    return Solid(vertices.reshape(-1, 3), (normals / lengths(normals)).reshape(-1, 3), faces.reshape(-1, 3))
 
 
 def _revolved(points: np.ndarray, heading: np.ndarray, segments: int) -> Solid:
     tangent = np.vstack([heading[:1], heading[1:] + heading[:-1], heading[-1:]])
-    tangent /= length(tangent)
+    tangent /= lengths(tangent)
     angle = np.linspace(0, 2 * np.pi, segments, endpoint=False)
     circle = np.stack([np.cos(angle), np.sin(angle), np.ones(segments)], axis=1)
     vertices = points[:, None, [0, 0, 1]] * circle
@@ -214,7 +211,7 @@ def _rim(bottom: np.ndarray, top: np.ndarray, normals: np.ndarray) -> Solid:
     """The strips that close sheets, flat per edge; `bottom` and `top` (k, n, 3) run once around each."""
     bottom_after, top_after = np.roll(bottom, -1, axis=1), np.roll(top, -1, axis=1)
     outward = cross(bottom_after - bottom, normals + np.roll(normals, -1, axis=1))
-    outward /= np.maximum(length(outward), 1e-30)
+    outward /= np.maximum(lengths(outward), 1e-30)
     corners = np.stack([bottom, bottom_after, top_after, top], axis=2).reshape(-1, 3)
     quads = np.arange(0, len(corners), 4)[:, None, None] + np.array([(0, 1, 2), (0, 2, 3)])
     return Solid(corners, np.repeat(outward.reshape(-1, 3), 4, axis=0), quads.reshape(-1, 3))

@@ -2,46 +2,51 @@
 
     (b - a) x (c - a)  =  normal of a triangle, twice its area long
 
-so the sum over the triangles about a vertex is its normal weighted by area. Vectors (..., 3) in metres.
+so the sum over the triangles about a vertex is its normal weighted by area. vertices (V, 3) in metres,
+faces (F, 3) numbers of vertices, counter-clockwise from outside.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+MIN_AREA_M2 = 1e-10
+"""Triangles smaller than this are dropped: 10 um squared, below anything that a pixel can see."""
+
 
 def smooth_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """(V, 3) area-weighted vertex normals of welded triangles."""
-    cross = facing(vertices, faces)
+    normals = face_normals(vertices, faces)
     total = np.stack(
-        [np.bincount(faces.T.ravel(), np.tile(cross[:, k], 3), len(vertices)) for k in range(3)], axis=1
+        [np.bincount(faces.T.ravel(), np.tile(normals[:, k], 3), len(vertices)) for k in range(3)], axis=1
     )
-    return total / np.maximum(length(total), 1e-30)
+    return total / np.maximum(lengths(total), 1e-30)
 
 
-def facing(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+def face_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """(F, 3) normals of triangles, twice their areas long."""
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     return cross(b - a, c - a)
 
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Cross products of the last axis; `numpy.cross` spends most of its time on moving axes."""
+    """(..., 3) cross products of two (..., 3); `numpy.cross` spends most of its time on moving axes."""
     (ax, ay, az), (bx, by, bz) = (np.moveaxis(v, -1, 0) for v in (a, b))
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
 
 
-def areas(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    cross = facing(vertices, faces)
-    return np.sqrt(np.einsum("fi,fi->f", cross, cross)) / 2
+def face_areas(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """(F,) areas of triangles, square metres."""
+    return lengths(face_normals(vertices, faces))[:, 0] / 2
 
 
-def length(vectors: np.ndarray) -> np.ndarray:
+def lengths(vectors: np.ndarray) -> np.ndarray:
+    """(..., 1) lengths of (..., 3)."""
     return np.sqrt(np.einsum("...i,...i->...", vectors, vectors))[..., None]
 
 
 def grid_faces(rows: int, cols: int, *, wrap_rows: bool = False, wrap_cols: bool = False) -> np.ndarray:
-    """Two triangles per cell of a (rows, cols) vertex grid, facing d_cols x d_rows."""
+    """(F, 3): two triangles per cell of a (rows, cols) vertex grid, facing d_cols x d_rows."""
     i = np.arange(rows if wrap_rows else rows - 1)[:, None]
     j = np.arange(cols if wrap_cols else cols - 1)[None]
     a, b = i * cols + j, i * cols + (j + 1) % cols
@@ -50,6 +55,6 @@ def grid_faces(rows: int, cols: int, *, wrap_rows: bool = False, wrap_cols: bool
 
 
 def repeated(faces: np.ndarray, groups: np.ndarray) -> np.ndarray:
-    """The faces of one group of vertices, for each of `groups` (k, ..., 3) laid end to end."""
+    """(k F, 3): the faces of one group of vertices, for each of `groups` (k, ..., 3) laid end to end."""
     size = int(np.prod(groups.shape[1:-1]))
     return (faces + np.arange(len(groups))[:, None, None] * size).reshape(-1, 3)

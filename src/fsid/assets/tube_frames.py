@@ -1,15 +1,16 @@
-"""Frames along paths, for tubes: tangents, and normals that turn no more than the path does.
+"""Paths of tubes: round ends, tangents, and normals that turn no more than the path does.
 
     n[k+1] = n[k] - (n[k] . t[k+1]) t[k+1]
 
-A rotation-minimising frame has no twist of its own, so texture runs straight along the tube. Paths (k, n, 3).
+A rotation-minimising frame has no twist of its own, so texture runs straight along the tube.
+Paths (k, n, 3) and radii (k, n) are in metres.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from fsid.assets.surfaces import cross, length
+from fsid.assets.surfaces import cross, lengths
 
 
 def with_caps(paths: np.ndarray, radii: np.ndarray, rings: int) -> tuple[np.ndarray, np.ndarray]:
@@ -18,28 +19,29 @@ def with_caps(paths: np.ndarray, radii: np.ndarray, rings: int) -> tuple[np.ndar
     ends = []
     for end, inner, radius in ((0, 1, radii[:, :1]), (-1, -2, radii[:, -1:])):
         outward = paths[:, end] - paths[:, inner]
-        outward = (outward / length(outward) * radius)[:, None]
+        outward = (outward / lengths(outward) * radius)[:, None]
         ends.append((paths[:, [end]] + np.sin(turn) * outward, radius * np.maximum(np.cos(turn[:, 0]), 1e-3)))
     (head, head_r), (tail, tail_r) = ends
     return np.hstack([head[:, ::-1], paths, tail]), np.hstack([head_r[:, ::-1], radii, tail_r])
 
 
 def tangents_of(paths: np.ndarray, closed: bool) -> np.ndarray:
+    """(k, n, 3) unit tangents."""
     around = np.roll(paths, -1, axis=1) - np.roll(paths, 1, axis=1)
     step = around if closed else np.gradient(paths, axis=1)
-    return step / length(step)
+    return step / lengths(step)
 
 
 def frames_along(tangents: np.ndarray, closed: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Rotation-minimising normals and binormals; a closed path spreads the leftover twist evenly."""
+    """Normals and binormals (k, n, 3) of least rotation; a closed path spreads the leftover twist evenly."""
     first = tangents[:, 0]
     normal = np.cross(first, np.eye(3)[np.abs(first).argmin(1)])
-    normals = [normal / length(normal)]
+    normals = [normal / lengths(normal)]
     for k in [*range(1, tangents.shape[1]), *([0] if closed else [])]:
         tangent, normal = tangents[:, k], normals[-1]
         normals.append(normal - tangent * (tangent * normal).sum(1, keepdims=True))
     transported = np.stack(normals, axis=1)
-    transported /= length(transported)
+    transported /= lengths(transported)
     frame = transported[:, : tangents.shape[1]]
     other = cross(tangents, frame)
     if closed:

@@ -60,7 +60,7 @@ def testset(
     """
     from fsid.evaluate import burst_testset, photo_testset, simulated_testset
 
-    _check(source, folders)
+    _check_folders(source, folders)
     if source == "simulate":
         with progress_bar("materials", "pictures", quiet=quiet) as progress:
             simulated_testset(
@@ -89,7 +89,7 @@ def testset(
         )
 
 
-def _check(source: str, folders: tuple[Path, ...]) -> None:
+def _check_folders(source: str, folders: tuple[Path, ...]) -> None:
     if source == "simulate" and folders:
         raise FsidError(f"fsid testset simulate: takes no folder, but {folders[0]} was given")
     if source != "simulate" and not folders:

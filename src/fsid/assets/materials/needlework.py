@@ -1,4 +1,4 @@
-"""What is made from yarn stitch by stitch: lace, embroidery, spools, crochet, plaited ribbons."""
+"""What is made of yarn: lace, embroidery, spools, crochet, plaited ribbons."""
 
 from __future__ import annotations
 

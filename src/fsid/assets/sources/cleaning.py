@@ -17,8 +17,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from fsid.assets.mesh import Mesh
-from fsid.assets.solids import MIN_AREA_M2
 from fsid.assets.sources.limits import RefusedError
+from fsid.assets.surfaces import MIN_AREA_M2, face_areas, face_normals
 
 KEPT_TRIANGLES = 40_000
 """Of one mesh; a scene holds dozens of them."""
@@ -76,16 +76,11 @@ def _without_degenerate(
     vertices: np.ndarray, faces: np.ndarray, parts: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Triangles that have an area, and the vertices that they use."""
-    good = np.linalg.norm(_cross(vertices, faces), axis=1) / 2 > MIN_AREA_M2
+    good = face_areas(vertices, faces) > MIN_AREA_M2
     if not good.any():
         raise RefusedError("no triangle with an area")
     used, flat = np.unique(faces[good], return_inverse=True)
     return vertices[used], flat.reshape(-1, 3), parts[good]
-
-
-def _cross(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    a, b, c = (vertices[faces[:, i]] for i in range(3))
-    return np.cross(b - a, c - a)
 
 
 def _welded(vertices: np.ndarray, faces: np.ndarray, cells: int) -> tuple[np.ndarray, np.ndarray]:
@@ -127,7 +122,7 @@ def _few_parts(
     vertices: np.ndarray, faces: np.ndarray, parts: np.ndarray, names: tuple[str, ...]
 ) -> tuple[np.ndarray, tuple[str, ...]]:
     """The KEPT_PARTS - 1 largest parts in the file's order, the rest as one."""
-    area = np.bincount(parts, np.linalg.norm(_cross(vertices, faces), axis=1), minlength=len(names))
+    area = np.bincount(parts, face_areas(vertices, faces), minlength=len(names))
     present = np.flatnonzero(area > 0)
     if len(present) > KEPT_PARTS:
         largest = np.sort(present[np.argsort(-area[present], kind="stable")[: KEPT_PARTS - 1]])
@@ -165,7 +160,7 @@ def _oriented(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     given, turned = label[:count], label[count:]
     piece = np.minimum(given, turned)
     side = np.where(given == piece, 1.0, -1.0)
-    cross = _cross(vertices, faces)
+    cross = face_normals(vertices, faces)
     area = np.linalg.norm(cross, axis=1) / 2
     centre = vertices[faces].mean(1)
     weight = np.maximum(np.bincount(piece, area), 1e-30)
@@ -181,7 +176,7 @@ def _oriented(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 def _split_at_creases(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Vertices, normals and faces with one vertex per smooth fan of corners."""
-    cross = _cross(vertices, faces)
+    cross = face_normals(vertices, faces)
     normal = cross / np.linalg.norm(cross, axis=1, keepdims=True)
     half_a, half_b = _edge_pairs(faces)
     smooth = (normal[half_a // 3] * normal[half_b // 3]).sum(1) > np.cos(np.radians(CREASE_DEG))
