@@ -3,7 +3,9 @@
 Mesa's llvmpipe draws into a row of scenes of its own. Each keeps what it has read until it is used again, and
 the first idle one is always taken: those at the end of the row, which only a busy moment reaches, hold images
 that were freed many frames ago. A busy moment made on purpose empties them all. It costs the next frame a
-seventh, so it is made only before much is freed. Other drivers have nothing to give back.
+seventh, so it is made only before much is freed. Since Mesa 25 the state of the last shader that read textures
+holds them, too, until another that reads one takes its place, so the busy shader reads one. Other drivers have
+nothing to give back.
 """
 
 from __future__ import annotations
@@ -17,6 +19,9 @@ _SCENES = 64
 
 _BUSY_PX = 512
 
+_UNIT = 16
+"""The texture unit of busy.frag, which no other shader has."""
+
 
 class Drain:
     """One slow image, and as many small ones waiting behind it as the row has scenes: milliseconds."""
@@ -25,12 +30,14 @@ class Drain:
         self._context = context
         self._slow = context.simple_framebuffer((_BUSY_PX, _BUSY_PX), 1)
         self._small = [context.simple_framebuffer((1, 1), 1) for _ in range(2)]
+        self._nothing = context.texture((1, 1), 1, b"\0")
         program = load_program(context, "screen.vert", "busy.frag")
         self._screen = context.vertex_array(program, [])
 
     def run(self) -> None:
         """Return when everything issued so far is done, and what has been freed is free."""
         self._context.finish()
+        self._nothing.use(_UNIT)
         for target in [self._slow, *self._small * (_SCENES // 2)]:
             target.use()
             self._screen.render(moderngl.TRIANGLES, vertices=3)
