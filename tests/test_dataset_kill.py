@@ -136,7 +136,7 @@ def test_kills_while_rendering_change_nothing(tmp_path: Path) -> None:
 
 def test_what_the_killed_left_half_written_goes_with_the_next_run(tiny: list[str], tmp_path: Path) -> None:
     """Also where nothing else is left to do."""
-    left = (".shard-00001.tar.elsewhere-27704.part", "config.yaml.part", "README.md.part")
+    left = (".shard-00001.tar.elsewhere-27704.part", "config.yaml.part", "README.md.27704.part")
     for _ in range(2):
         for name in left:
             (tmp_path / name).write_bytes(b"half a")

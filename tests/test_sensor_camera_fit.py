@@ -1,5 +1,6 @@
 """Frames on disk become the profile of the camera that took them."""
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -213,7 +214,8 @@ def test_bad_bursts_are_named(tmp_path, dng_bursts, rng):
     _fails("at least one burst", [])
     _fails("no dark frames and no black level", good, layout=replace(LAYOUT, black_level=None))
     _fails("states its CFA", [light], layout=LAYOUT)
-    _fails("not dark", [light], dark=[dng_bursts / "light1600"])
+    _fails("frame and as a dark frame", [light], dark=[light / "000.dng"])
+    _fails("not dark", [light], dark=[shutil.copytree(light, tmp_path / "lit")])
     moved = write_arrays(tmp_path / "moved", [np.roll(image, 12 * n, 1) for n, image in enumerate(ramp)])
     _fails("001.npy.*(moved|static scene)", moved, layout=LAYOUT)
     _fails("saturated", write_arrays(tmp_path / "white", [np.full((64, 64), 1023)] * 4), layout=LAYOUT)

@@ -41,6 +41,23 @@ def test_flicker_and_drift_do_not_count_as_noise(rng):
     assert fit.sigma2_dn[0] == pytest.approx(SIGMA2, rel=0.15)
 
 
+@pytest.mark.parametrize(
+    "gains",
+    [[1.04] + [1.0] * 19, [0.96] + [1.0] * 19, [1.04, 0.96] * 10, [0.96, 1.04] * 10],
+    ids=["first brighter", "first dimmer", "alternating", "alternating, dim first"],
+)
+def test_the_first_frame_has_no_more_say_than_the_others(rng, gains):
+    """Variance and mean are those of the burst's mean light, whichever frame it is compared with."""
+    wide = np.broadcast_to(np.linspace(0, 2400, 4 * SIDE), (2 * SIDE, 4 * SIDE))
+    fit = fit_noise(
+        [burst(exposure(rng, wide, gain) for gain in gains)],
+        cfa=None,
+        white_level=WHITE,
+        black_level=BLACK,
+    )
+    assert fit.k_dn[0] == pytest.approx(K, rel=0.007)
+
+
 def test_a_moving_object_is_left_out(rng):
     def frame(number):
         light = RAMP.copy()

@@ -41,7 +41,8 @@ def calibrate(
 
     Args:
         frames: RAW files that LibRaw opens, or bare mosaics (.npy, 16-bit .png or .tif, .raw); folders
-            stand for their files. The ISO of bare mosaics is --iso, or in their path: iso3200/a.png.
+            stand for the files in them, at any depth. The ISO of bare mosaics is --iso, or in their path:
+            iso3200/a.png.
         output: Profile to write, .yaml.
         dark: Frames with the lens covered, of the same ISOs: they give black level and sigma2.
         iso: ISO of all bare mosaics.
@@ -64,7 +65,7 @@ def calibrate(
 
     check_folder(output)
     if plot is not None:
-        check_picture(plot)
+        check_picture(plot, output)
     layout = Layout(iso, cfa, black_level, white_level, width, height)
     with progress_bar("reading", "frames", quiet=quiet) as progress:
         found = calibrate_frames(

@@ -39,11 +39,12 @@ def denoise(
         input: DNG or any other Bayer RAW that LibRaw opens; or a bare mosaic (.npy, 16-bit .png or .tif, .raw
             or .bin of 16-bit little-endian values), given --cfa, --black-level and --white-level; or a folder
             of either.
-        output: DNG file to write, another than the input; a folder where the input is one.
+        output: DNG file to write (replaced if it is there), another than the input; a folder where the input
+            is one.
         model: Folder of a training (fsid train), its model.safetensors, a file of fsid export (.onnx or
             .safetensors), or the name of a shipped network; by default the shipped one.
         profile: Noise profile, a built-in name (fsid profiles) or a file; by default the file's own noise.
-        iso: ISO of the profile's level; by default the file's.
+        iso: ISO of the profile's level; by default the file's, which the output keeps.
         strength: 0 to 1: share of the noise's amplitude to remove (1 all of it, less leaves grain). Above 1:
             take the noise for that many times as strong, which smooths more (at most 100).
         backend: What runs the network: torch (on a GPU where there is one) or onnx (onnxruntime, on the CPU);

@@ -48,6 +48,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
 }
 
 DESCRIPTION = "RAW denoisers trained on nothing but rendered scenes: generate pairs, train, denoise, prove."
+RESUMABLE = {"generate", "train", "experiment"}
 EXTRAS = {
     "torch": "train",
     "accelerate": "train",
@@ -79,8 +80,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
             f"this command needs {error.name}, which is not installed: "
             f"pip install 'fsid[{EXTRAS[error.name]}]'"
         )
+    except OSError as error:
+        if error.filename is None:
+            raise
+        _fail(f"{error.filename}: {error.strerror}")
     except KeyboardInterrupt:
-        Console(stderr=True).print("fsid: interrupted; run the same command again to continue")
+        goes_on = set(sys.argv[1:2] if arguments is None else arguments[:1]) & RESUMABLE
+        hint = "; run the same command again to continue" if goes_on else ""
+        Console(stderr=True).print(f"fsid: interrupted{hint}")
         sys.exit(130)
 
 

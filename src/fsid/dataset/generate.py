@@ -23,7 +23,7 @@ from fsid.dataset.shards import remove_parts, shard_keys, shard_path, write_shar
 from fsid.dataset.worker import Worker
 from fsid.errors import FsidError
 from fsid.files import held
-from fsid.sensor import load_profile
+from fsid.sensor import load_bayer_profile
 
 SHARD_SIZE = 16
 SAMPLES_PER_WORKER = 320
@@ -131,7 +131,7 @@ def generate(
 def dataset_config(config: GenerateConfig, seed: int, shard_size: int = 0) -> DatasetConfig:
     """The identity of the dataset of (config, seed); FsidError where what it names does not exist."""
     for camera in config.cameras:
-        load_profile(camera)
+        load_bayer_profile(camera)
     scene = config.scene
     for folder in (*scene.mesh_folders, *scene.texture_folders, scene.hdri_folder):
         if not Path(folder).exists():

@@ -32,7 +32,7 @@ def part_path(path: Path) -> Path:
 
 def remove_parts(folder: Path) -> None:
     """Remove what killed writers left in a dataset's folder. One that still writes fails, harmlessly."""
-    for pattern in (".shard-*.part", "config.yaml.part", "README.md.part", "samples.png.part"):
+    for pattern in (".shard-*.part", "config.yaml*.part", "README.md*.part", "samples.png*.part"):
         for part in folder.glob(pattern):
             part.unlink(missing_ok=True)
 

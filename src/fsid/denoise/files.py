@@ -46,7 +46,11 @@ def find_raws(folder: Path, *, bare: bool = False) -> list[Path]:
     if not folder.is_dir():
         raise FsidError(f"{folder}: is not a folder of RAW files")
     suffixes = BARE_SUFFIXES if bare else sorted(RAW_SUFFIXES)
-    raws = sorted(path for path in folder.iterdir() if path.suffix.lower() in suffixes)
+    try:
+        inside = sorted(path for path in folder.iterdir() if path.is_file())
+    except OSError as error:
+        raise FsidError(f"{folder}: cannot be read ({error.strerror})") from None
+    raws = [p for p in inside if p.suffix.lower() in suffixes and not p.name.startswith(".")]
     if not raws:
         what = "bare mosaic" if bare else "RAW file"
         raise FsidError(f"{folder}: holds no {what} ({', '.join(suffixes)})")
@@ -109,7 +113,7 @@ def denoise_file(
         raise FsidError(f"{target}: is the original, which would be overwritten; give another name")
     raw = read_input(source, layout)
     noise = noise_of(raw, profile, iso, source)
-    if iso is not None:
+    if iso is not None and not raw.iso > 0:
         raw = replace(raw, iso=iso)
     try:
         clean = denoise_raw(raw, model, noise.level, strength=strength, progress=progress)

@@ -17,7 +17,7 @@ import numpy as np
 from fsid.errors import FsidError
 from fsid.evaluate.testbench import MATERIALS, simulate
 from fsid.evaluate.testset import Progress, TestImage, TestSet, capture, levels_of
-from fsid.sensor import Raw, clean_from_linear, load_profile
+from fsid.sensor import Raw, clean_from_linear, load_bayer_profile
 from fsid.sensor.light import GREY, KEY
 
 LUXES = (0.5, 1.0, 2.0, 5.0)
@@ -42,7 +42,7 @@ def simulated_testset(
 
     luxes and isos: the levels, LUXES where neither is given. materials: of MATERIALS, all where none is.
     """
-    profile = load_profile(camera)
+    profile = load_bayer_profile(camera)
     levels = levels_of(profile, isos, luxes or (() if isos else LUXES))
     materials = materials or tuple(MATERIALS)
     if unknown := set(materials) - set(MATERIALS):

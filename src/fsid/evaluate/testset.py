@@ -30,7 +30,7 @@ from fsid.sensor import (
     clean_from_photo,
     clean_levels,
     light_level,
-    load_profile,
+    load_bayer_profile,
     noisy_from_clean,
     write_dng,
 )
@@ -106,7 +106,7 @@ def photo_testset(
 
     The set of an image is the name of its folder. Photograph i draws from SeedSequence(seed, spawn_key=(i,)).
     """
-    profile = load_profile(camera)
+    profile = load_bayer_profile(camera)
     levels = levels_of(profile, isos, luxes)
     photos = [(folder.name, path) for folder in folders for path in find_photos(folder)]
     testset = TestSet(

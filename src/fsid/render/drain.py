@@ -3,9 +3,9 @@
 Mesa's llvmpipe draws into a row of scenes of its own. Each keeps what it has read until it is used again, and
 the first idle one is always taken: those at the end of the row, which only a busy moment reaches, hold images
 that were freed many frames ago. A busy moment made on purpose empties them all. It costs the next frame a
-seventh, so it is made only before much is freed. Since Mesa 25 the state of the last shader that read textures
-holds them, too, until another that reads one takes its place, so the busy shader reads one. Other drivers have
-nothing to give back.
+seventh, so it is made only before much is freed. In Mesa 25 the state of the last shader that read textures
+holds them, too, until another that reads one takes its place, so the busy shader reads one. Other drivers
+have nothing to give back.
 """
 
 from __future__ import annotations

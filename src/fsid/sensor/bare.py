@@ -24,6 +24,7 @@ from fsid.sensor.quantise import MAX_DN, check_levels, from_dn
 from fsid.sensor.raw import Raw
 
 MAX_PIXELS = 1 << 29
+BEYOND_WHITE, BEYOND_WHITE_SHARE = 1.1, 0.001  # of the range; of the values: the white level is wrong
 logging.getLogger("tifffile").setLevel(
     logging.CRITICAL
 )  # what is wrong with a file is said in one line, here
@@ -79,8 +80,10 @@ def read_mosaic(
     check_levels(black_level, white_level, str(path))
     if len(white_balance) != 3 or not min(white_balance) > 0:
         raise FsidError(f"{path}: white_balance {white_balance} must be three positive gains")
+    dn = read_dn(path, cfa=cfa, width=width, height=height)
+    check_white(dn, black_level, white_level, path)
     return Raw(
-        mosaic=from_dn(read_dn(path, cfa=cfa, width=width, height=height), black_level, white_level),
+        mosaic=from_dn(dn, black_level, white_level),
         cfa=cfa,
         black_level=black_level,
         white_level=white_level,
@@ -100,9 +103,12 @@ def read_dn(
     above 16 bits.
     """
     path = Path(path)
-    if not path.is_file():
-        raise FsidError(f"{path}: no such mosaic file")
-    dn = _read(path, cfa, width, height)
+    try:
+        if not path.is_file():
+            raise FsidError(f"{path}: no such mosaic file")
+        dn = _read(path, cfa, width, height)
+    except OSError as error:
+        raise FsidError(f"{path}: cannot be read ({error.strerror})") from None
     if dn.ndim != 2 or min(dn.shape) < 2:
         raise FsidError(f"{path}: holds an array of shape {dn.shape}, not a mosaic (height, width)")
     if dn.dtype.kind not in "ui" or dn.min() < 0 or dn.max() > MAX_DN:
@@ -110,6 +116,19 @@ def read_dn(
     if (height or dn.shape[0], width or dn.shape[1]) != dn.shape:
         raise FsidError(f"{path}: is {dn.shape[1]}x{dn.shape[0]}, not {width}x{height}; correct the size")
     return dn[: dn.shape[0] // 2 * 2, : dn.shape[1] // 2 * 2]
+
+
+def check_white(dn: np.ndarray, black_level: int, white_level: int, path: str | Path) -> None:
+    """FsidError where values lie far beyond the white level.
+
+    A sensor saturates near one value, each of its pixels a little above or below it; hot pixels are few.
+    """
+    beyond = float(np.mean(dn > black_level + BEYOND_WHITE * (white_level - black_level)))
+    if beyond > BEYOND_WHITE_SHARE:
+        raise FsidError(
+            f"{path}: {100 * beyond:.2g} % of its values lie far beyond the white level {white_level}, "
+            f"up to {int(dn.max())}; state where the sensor saturates"
+        )
 
 
 def _read(path: Path, cfa: str | None, width: int | None, height: int | None) -> np.ndarray:

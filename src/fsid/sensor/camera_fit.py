@@ -22,11 +22,13 @@ from fsid.sensor.camera_profile import MONO, CameraProfile, Measurement
 from fsid.sensor.colour import published_matrices
 from fsid.sensor.frames import Frame, FrameSet, Layout, bursts, find_frames
 from fsid.sensor.temporal import TemporalStatistics
-from fsid.sensor.terms_fit import CUT_OFF, DarkFinding, dark_finding, fit_terms, prnu_of
+from fsid.sensor.terms_fit import CUT_OFF, DarkFinding, dark_finding, fit_terms, prnu_of, shortest_dark
 
 MIN_FRAMES = 3  # of one ISO; a variance from two is one number per pixel, and a defect looks like noise
 DARK_LEVEL = 0.05  # of the range, above which a dark frame saw light
 DARK_CONTRAST = 0.02  # of the range between blocks, above which a dark frame shows a picture
+BLACK_DIFFERS = 0.01  # of the range, from which on dark frames contradict a stated black level
+BELOW_BLACK = 0.01  # of the pixels that may have a mean as far below the black level
 UNCERTAIN = 0.02  # relative standard error of k that deserves a note
 _METHOD = "fsid calibrate: weighted line through pooled temporal variances per CFA site (sensor/calibrate.py)"
 
@@ -81,14 +83,18 @@ class _Reader:
         self.moved: list[Path] = []
         self.saturated: list[Path] = []
         self.cut_off: list[float] = []  # ISOs whose read noise reaches DN 0
+        self.blacks: list[tuple[int, float, Path]] = []  # stated and measured black level that differ
         self.dark: list[DarkFinding] = []
         self.prnu: list[float] = []
         self._done, self._total = 0, len(found.frames) + len(found.dark)
 
     def statistics(self, burst: Sequence[Frame], *, dark: bool = False) -> TemporalStatistics:
         if len(burst) < 2:
+            alone = "ISO and exposure"
+            if self.found.camera.bare:
+                alone = f"light, {burst[0].level:.1f} DN on the mean, within 3 % of the file before it"
             raise FsidError(
-                f"{burst[0].path}: the only frame of its ISO and exposure; a burst needs the same picture "
+                f"{burst[0].path}: the only frame of its {alone}; a burst needs the same picture "
                 f"several times: add frames or leave it out"
             )
         stats = TemporalStatistics(self.found.camera.white_level, dark=dark)
@@ -124,20 +130,28 @@ def _fit_iso(reader: _Reader, iso: float, tie_greens: bool) -> NoiseFit:
         )
     pooled += _pool_lights(reader, iso, lights, black)
     try:
-        return fit_samples(pooled, black, tie_greens=tie_greens)
+        fit = fit_samples(pooled, black, tie_greens=tie_greens)
     except FsidError as error:
         raise FsidError(f"{lights[0].path}: ISO {iso:g}: {error}") from error
+    if fit.k_dn.min() <= 0:
+        site = int(fit.k_dn.argmin())
+        raise FsidError(
+            f"{lights[0].path}: ISO {iso:g}: noise does not grow with light (k is {fit.k_dn[site]:.2g} "
+            f"+- {fit.k_dn_error[site]:.2g} DN); take brighter frames, or more of them"
+        )
+    return fit
 
 
 def _pool_dark(reader: _Reader, iso: float, frames: list[Frame]) -> tuple[np.ndarray | None, list[_Pooled]]:
     """Black level per site in DN, from the file where there are no frames, and what the frames pool to.
 
-    The shortest exposure is the black level; longer ones are dark current above it.
+    The shortest exposure is the black level, of bare mosaics the lowest one; the others are dark current.
     """
     camera = reader.found.camera
     black = None if camera.black_level is None else _per_site(camera.black_level, camera.cfa)
     pooled: list[_Pooled] = []
-    for number, burst in enumerate(bursts(frames)):
+    shortest_first = sorted(bursts(frames), key=lambda burst: (burst[0].exposure_s, burst[0].level))
+    for number, burst in enumerate(shortest_first):
         stats = reader.statistics(burst, dark=True)
         _check_dark(stats, burst[0].path, camera.black_level, camera.white_level)
         if (finding := dark_finding(stats, iso, burst[0].exposure_s)) is not None:
@@ -146,19 +160,33 @@ def _pool_dark(reader: _Reader, iso: float, frames: list[Frame]) -> tuple[np.nda
             reader.cut_off.append(iso)
         samples, levels = pool_dark(stats, camera.cfa, camera.white_level, black if number > 0 else None)
         if number == 0:
+            _check_black(reader, float(levels.mean()), burst[0].path)
             black = levels
         pooled.append(samples)
     return black, pooled
 
 
+def _check_black(reader: _Reader, measured: float, path: Path) -> None:
+    """A stated black level that the dark frames contradict: refused where the user states it, else noted."""
+    camera = reader.found.camera
+    stated = camera.black_level
+    if stated is None or abs(stated - measured) <= BLACK_DIFFERS * (camera.white_level - measured):
+        return
+    if camera.bare:
+        raise FsidError(f"{path}: dark frames of mean {measured:.1f} DN contradict --black-level {stated}")
+    reader.blacks.append((stated, measured, path))
+
+
 def _pool_lights(reader: _Reader, iso: float, frames: list[Frame], black: np.ndarray) -> list[_Pooled]:
     """What the lit bursts pool to, a burst each; at least one has to be usable in every site."""
     camera = reader.found.camera
-    fixed_dn2 = next((found.fixed_dn2 for found in reversed(reader.dark) if found.iso == iso), 0.0)
+    shortest = shortest_dark(reader.dark, iso)
+    fixed_dn2 = shortest.fixed_dn2 if shortest else 0.0
     pooled: list[_Pooled] = []
     usable = False
     for burst in bursts(frames):
         stats = reader.statistics(burst)
+        _check_above(stats, float(black.mean()), camera.white_level, burst[0].path)
         try:
             samples = pool(stats, camera.cfa, black, camera.white_level)
         except FsidError as error:
@@ -187,6 +215,18 @@ def _check_dark(stats: TemporalStatistics, path: Path, black: int | None, white:
         raise FsidError(f"{path}: a dark frame that shows a picture is not dark; cover the lens")
 
 
+def _check_above(stats: TemporalStatistics, black: float, white: int, path: Path) -> None:
+    mean, variance = stats.sites(None)[0]
+    if not mean.size:
+        return
+    tolerance = BLACK_DIFFERS * (white - black) + 5 * float(np.sqrt(np.median(variance) / stats.frames))
+    below = float(np.mean(mean < black - tolerance))
+    if below > BELOW_BLACK:
+        raise FsidError(
+            f"{path}: {100 * below:.0f} % of its pixels lie below the black level, {black:.0f} DN"
+        )
+
+
 def _notes(reader: _Reader, isos: Sequence[float], fits: Sequence[NoiseFit]) -> Iterator[str]:
     if unmatched := {frame.iso for frame in reader.found.dark} - set(isos):
         yield f"dark frames of ISO {', '.join(f'{i:g}' for i in sorted(unmatched))} have no bursts: unused"
@@ -201,6 +241,8 @@ def _notes(reader: _Reader, isos: Sequence[float], fits: Sequence[NoiseFit]) -> 
     ):
         if paths:
             yield f"{len(paths)} bursts, the first one that of {paths[0]}: {what}"
+    for stated, measured, path in reader.blacks:
+        yield f"{path}: dark frames have a mean of {measured:.1f} DN, the files' black level is {stated}"
     for iso in sorted(set(reader.cut_off)):
         yield f"ISO {iso:g}: dark noise reaches DN 0 and is cut off; corrected as far as it is Gaussian"
     for iso, fit in zip(isos, fits, strict=True):

@@ -23,7 +23,7 @@ from fsid.sensor import dng_tags
 from fsid.sensor.colour import published_matrices
 from fsid.sensor.embedded import embedded_directories
 from fsid.sensor.metadata import Metadata, kept_metadata, libraw_metadata, taken
-from fsid.sensor.mosaic import CFA_PATTERNS, site_offsets
+from fsid.sensor.mosaic import CFA_PATTERNS
 from fsid.sensor.quantise import from_dn, to_dn
 from fsid.sensor.raw import Raw
 from fsid.sensor.tiff import (
@@ -97,8 +97,9 @@ def read_header(path: str | Path) -> RawHeader:
 def read_raw(path: str | Path) -> Raw:
     """Any Bayer RAW file as `Raw`: visible area, even size, levels, CFA of its first pixel, colour, noise.
 
-    Black levels that differ between sites are subtracted each; `black_level` is their rounded mean. Unknown
-    colour becomes the mean of the published matrices, unknown white balance (1, 1, 1), unknown ISO 0.
+    Black levels that differ between sites (in a DNG in any pattern, and by fractions of a DN) are subtracted
+    each; `black_level` is their rounded mean. Unknown colour becomes the mean of the published matrices,
+    unknown white balance (1, 1, 1), unknown ISO 0.
     FsidError: missing, truncated, no RAW, not Bayer (X-Trans, Foveon, linear DNG, monochrome).
     """
     path = Path(path)
@@ -108,10 +109,13 @@ def read_raw(path: str | Path) -> Raw:
 
 @contextmanager
 def _opened(path: Path) -> Iterator[tuple[rawpy.RawPy, _Source]]:
-    """LibRaw's view of a file and its TIFF tags; whatever LibRaw refuses becomes one line."""
-    if not path.is_file():
-        raise FsidError(f"{path}: no such RAW file")
-    source = _read_source(path)
+    """LibRaw's view of a file and its TIFF tags; whatever LibRaw or the disk refuses becomes one line."""
+    try:
+        if not path.is_file():
+            raise FsidError(f"{path}: no such RAW file")
+        source = _read_source(path)
+    except OSError as error:
+        raise FsidError(f"{path}: cannot be read ({error.strerror})") from None
     try:
         with rawpy.imread(str(path)) as file:
             yield file, source
@@ -165,18 +169,21 @@ def _read_source(path: Path) -> _Source:
 def _from_libraw(file: rawpy.RawPy, source: _Source, path: Path) -> Raw:
     tags = source.values
     cfa = _cfa(file, path)
-    tile = file.raw_colors_visible[:2, :2]
     dn = file.raw_image_visible
     dn = dn[: dn.shape[0] - dn.shape[0] % 2, : dn.shape[1] - dn.shape[1] % 2]
     if dn.size == 0:
         raise FsidError(f"{path}: is smaller than one 2x2 tile of its filter pattern")
-    blacks = np.asarray(file.black_level_per_channel, np.float64)
+    blacks = dng_tags.black_tile(tags)
+    if blacks is None:
+        blacks = np.asarray(file.black_level_per_channel, np.float64)[file.raw_colors_visible[:2, :2]]
     black, white = round(float(blacks.mean())), int(file.white_level)
     if not 0 <= black < white:
         raise FsidError(f"{path}: black level {black} is not below white level {white}")
     mosaic = from_dn(dn, black, white)
-    for r, c in site_offsets(cfa):
-        mosaic[r::2, c::2] -= np.float32((blacks[tile[r, c]] - black) / (white - black))
+    rows, columns = blacks.shape
+    for (r, c), level in np.ndenumerate(blacks):
+        mosaic[r::rows, c::columns] -= np.float32((level - black) / (white - black))
+    metadata = source.metadata or libraw_metadata(file)
     return Raw(
         mosaic=mosaic,
         cfa=cfa,
@@ -187,7 +194,7 @@ def _from_libraw(file: rawpy.RawPy, source: _Source, path: Path) -> Raw:
         camera=dng_tags.camera_name(tags),
         iso=_iso(file, tags),
         noise=dng_tags.noise_level(tags),
-        metadata=source.metadata or libraw_metadata(file),
+        metadata=metadata.within(dn.shape[1], dn.shape[0]),
     )
 
 

@@ -26,12 +26,13 @@ MAKE, MODEL = 271, 272
 CFA_REPEAT, CFA_PATTERN = 33421, 33422
 EXIF_ISO = 34855
 DNG_VERSION, DNG_BACKWARD_VERSION, UNIQUE_CAMERA_MODEL = 50706, 50707, 50708
-CFA_PLANE_COLOUR, CFA_LAYOUT, BLACK_LEVEL, WHITE_LEVEL = 50710, 50711, 50714, 50717
+CFA_PLANE_COLOUR, CFA_LAYOUT, BLACK_REPEAT, BLACK_LEVEL, WHITE_LEVEL = 50710, 50711, 50713, 50714, 50717
 COLOUR_MATRIX_1, COLOUR_MATRIX_2, AS_SHOT_NEUTRAL, PRIVATE_DATA = 50721, 50722, 50728, 50740
 ILLUMINANT_1, ILLUMINANT_2, NOISE_PROFILE = 50778, 50779, 51041
 
 D65 = 21  # EXIF LightSource
 MAX_EXIF_ISO = 65535
+MAX_REPEAT = 16  # rows and columns of a pattern of black levels; LibRaw rounds them and keeps 2 x 2
 
 _OWNER = b"FSID\0"
 
@@ -128,6 +129,19 @@ def date_taken(tags: Tags) -> str:
     """Day on which the picture was taken, "2026-11-21"; "" where `tags` state none."""
     day = _text(tags, DATE_TAKEN)[:10].replace(":", "-")
     return day if re.fullmatch(r"\d{4}-\d\d-\d\d", day) else ""
+
+
+def black_tile(tags: Tags) -> np.ndarray | None:
+    """(rows, columns) black levels in DN that repeat from the image's first pixel on; None where `tags` are
+    not a DNG's, or state none that fit their pattern."""
+    values = np.array(_numbers(tags, BLACK_LEVEL), np.float64)
+    repeat = _numbers(tags, BLACK_REPEAT) or (1, 1)
+    if DNG_VERSION not in tags or len(repeat) != 2 or not all(1 <= n <= MAX_REPEAT for n in repeat):
+        return None
+    rows, columns = int(repeat[0]), int(repeat[1])
+    if len(values) == 2 * rows * columns and np.all(values[1::2] > 0):
+        values = values[::2] / values[1::2]
+    return values.reshape(rows, columns) if len(values) == rows * columns else None
 
 
 def d65_matrix(tags: Tags) -> np.ndarray | None:

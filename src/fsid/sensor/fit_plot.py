@@ -25,8 +25,13 @@ PICTURES = (".png", ".pdf", ".svg")
 _MAX_COLUMNS = 4  # ISOs in one picture; of more, evenly chosen ones
 
 
-def check_picture(path: Path) -> None:
-    """FsidError unless a picture can be written to `path`: before the work of which it is made."""
+def check_picture(path: Path, beside: Path | None = None) -> None:
+    """FsidError unless a picture can be written to `path`: before the work of which it is made.
+
+    beside: another file that is written, too.
+    """
+    if beside is not None and path.resolve() == beside.resolve():
+        raise FsidError(f"{path}: would be both profile and plot; give two names")
     if path.suffix.lower() not in PICTURES:
         raise FsidError(f"{path}: a plot is written as {', '.join(PICTURES)}")
     check_folder(path)

@@ -2,26 +2,26 @@
 
 RAW files say their ISO and exposure time. Bare mosaics (.npy, .png, .tif, .raw) say nothing: their ISO is
 what the caller gives, or what their path says ("iso3200/a.png", "dark_ISO800_3.npy"), and consecutive files
-whose mean level agrees within 3 % are one burst. Frames are opened one by one and never kept.
+whose mean level agrees within 3 % or half a DN are one burst. Frames are opened one by one and never kept.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path
 
 import numpy as np
 
 from fsid.errors import FsidError
-from fsid.sensor.bare import BARE_SUFFIXES, Layout, read_dn
+from fsid.sensor.bare import BARE_SUFFIXES, Layout, check_white, read_dn
 from fsid.sensor.dng import RawHeader, read_header, read_raw
 from fsid.sensor.mosaic import check_cfa
 from fsid.sensor.quantise import check_levels, to_dn
 
-SAME_LIGHT = 0.03  # relative difference of the levels of two frames of one burst
+SAME_LIGHT, SAME_DN = 0.03, 0.5  # difference of the levels of two frames of one burst, relative or in DN
 _ISO_IN_PATH = re.compile(r"iso[-_ ]?(\d+)", re.IGNORECASE)
 _SITES_DIFFER = 0.02  # of the level: a flat grey through colour filters differs by far more
 
@@ -82,6 +82,10 @@ def find_frames(
     paths, dark = _files(paths), _files(dark)
     if not paths:
         raise FsidError("calibration needs the frames of at least one burst")
+    if both := {path.resolve() for path in paths} & {path.resolve() for path in dark}:
+        raise FsidError(f"{min(both)}: is given as a frame and as a dark frame; leave one out")
+    if layout.iso is not None and not layout.iso > 0:
+        raise FsidError(f"--iso {layout.iso:g}: must be above 0")
     bare = paths[0].suffix.lower() in BARE_SUFFIXES
     for path in (*paths, *dark):
         if (path.suffix.lower() in BARE_SUFFIXES) != bare:
@@ -97,20 +101,32 @@ def bursts(frames: Sequence[Frame]) -> list[tuple[Frame, ...]]:
     for _, same in groupby(sorted(frames, key=lambda f: f.exposure_s), key=lambda f: f.exposure_s):
         found.append([])
         for frame in same:
-            if found[-1] and abs(frame.level - found[-1][0].level) > SAME_LIGHT * found[-1][0].level:
+            if found[-1] and not _same_light(frame, found[-1][0]):
                 found.append([])
             found[-1].append(frame)
     return [tuple(burst) for burst in found]
 
 
+def _same_light(one: Frame, other: Frame) -> bool:
+    return abs(one.level - other.level) <= max(SAME_LIGHT * other.level, SAME_DN)
+
+
 def _files(paths: Sequence[Path]) -> list[Path]:
-    """`paths` with folders replaced by their files."""
-    files: list[Path] = []
+    """`paths` with folders replaced by the files in them and in their folders, each file once."""
+    files: dict[Path, Path] = {}
     for path in paths:
         if not path.exists():
             raise FsidError(f"{path}: no such frame")
-        files += sorted(p for p in path.iterdir() if p.is_file()) if path.is_dir() else [path]
-    return files
+        inside = sorted(p for p in path.rglob("*") if p.is_file() and not _hidden(p, path))
+        if path.is_dir() and not inside:
+            raise FsidError(f"{path}: holds no frames")
+        for file in inside if path.is_dir() else [path]:
+            files.setdefault(file.resolve(), file)
+    return list(files.values())
+
+
+def _hidden(path: Path, root: Path) -> bool:
+    return any(part.startswith(".") for part in path.relative_to(root).parts)
 
 
 def _raw_frames(paths: Sequence[Path], dark: Sequence[Path], layout: Layout) -> FrameSet:
@@ -130,8 +146,10 @@ def _raw_frames(paths: Sequence[Path], dark: Sequence[Path], layout: Layout) -> 
         header: RawHeader = headers[path]
         return Frame(path, header.iso or _iso(path, layout), header.exposure_s, 0.0)
 
-    sets = tuple(frame(path) for path in paths), tuple(frame(path) for path in dark)
-    return FrameSet(camera, *sets, headers[paths[0]].date, ())
+    frames, notes = _iso_or_100([frame(path) for path in (*paths, *dark)])
+    return FrameSet(
+        camera, tuple(frames[: len(paths)]), tuple(frames[len(paths) :]), headers[paths[0]].date, notes
+    )
 
 
 def _bare_frames(
@@ -149,6 +167,8 @@ def _bare_frames(
             raise FsidError(f"{path}: is {dn.shape[1]}x{dn.shape[0]}, the first frame is another size")
         if number == 0 and layout.cfa is None:
             _check_mono(path, dn)
+        if layout.white_level is not None:
+            check_white(dn, layout.black_level or 0, layout.white_level, path)
         shape, highest = dn.shape, max(highest, int(dn.max()))
         frames.append(Frame(path, _iso(path, layout), 0.0, float(dn.mean())))
         if progress is not None:
@@ -160,19 +180,25 @@ def _bare_frames(
         notes.append(
             f"white level {white} DN taken from the largest value, {highest}; --white-level states it"
         )
-    if any(frame.iso == 0 for frame in frames):
-        notes.append("no ISO known, noted as ISO 100; --iso states it")
-        frames = [Frame(f.path, f.iso or 100.0, f.exposure_s, f.level) for f in frames]
+    frames, unknown = _iso_or_100(frames)
     check_levels(layout.black_level or 0, white, str(paths[0]))
     camera = Camera("", cfa, layout.black_level, white, bare=True)
-    return FrameSet(camera, tuple(frames[: len(paths)]), tuple(frames[len(paths) :]), "", tuple(notes))
+    return FrameSet(camera, tuple(frames[: len(paths)]), tuple(frames[len(paths) :]), "", (*notes, *unknown))
+
+
+def _iso_or_100(frames: list[Frame]) -> tuple[list[Frame], tuple[str, ...]]:
+    """The frames, those of unknown ISO as of ISO 100, and a note where there were any."""
+    if all(frame.iso > 0 for frame in frames):
+        return frames, ()
+    known = [frame if frame.iso > 0 else replace(frame, iso=100.0) for frame in frames]
+    return known, ("no ISO known, noted as ISO 100; --iso states it",)
 
 
 def _iso(path: Path, layout: Layout) -> float:
-    """The ISO that the caller gives, else the last one in the file's name or its folder's, else 0."""
+    """The ISO that the caller gives, else the last one in the path, else 0."""
     if layout.iso is not None:
         return layout.iso
-    named = _ISO_IN_PATH.findall(f"{path.parent.name}/{path.name}")
+    named = _ISO_IN_PATH.findall(path.as_posix())
     return float(named[-1]) if named else 0.0
 
 

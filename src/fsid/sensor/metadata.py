@@ -11,7 +11,7 @@ RAF) say orientation, exposure and lens through LibRaw instead.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from fsid.sensor.tiff import ASCII, RATIONAL, SHORT, Tag, rationals
@@ -49,9 +49,33 @@ class Metadata:
         values = next((tag.values for tag in self.first if tag.code == ORIENTATION), ())
         return int(values[0]) if len(values) and not isinstance(values, bytes) else 1
 
+    def within(self, width: int, height: int) -> Metadata:
+        """The same for an image of that many pixels: a crop that reaches beyond them ends there."""
+        crop = {tag.code: tag for tag in self.mosaic if tag.code in (CROP_ORIGIN, CROP_SIZE)}
+        if len(crop) < 2:
+            return self
+        first, size = (_numbers(crop[code]) for code in (CROP_ORIGIN, CROP_SIZE))
+        if len(first) != 2 or len(size) != 2:
+            return self
+        ends = [min(n, max(side - o, 0.0)) for o, n, side in zip(first, size, (width, height), strict=True)]
+        if ends == size:
+            return self
+        fitting = Tag(CROP_SIZE, RATIONAL, rationals(ends))
+        return replace(self, mosaic=tuple(fitting if t.code == CROP_SIZE else t for t in self.mosaic))
+
     def without_geometry(self) -> Metadata:
         """The same for an image that was cropped or mirrored: crop and lens corrections are off."""
         return Metadata(self.first, tuple(t for t in self.mosaic if t.code not in _GEOMETRY), self.exif)
+
+
+def _numbers(tag: Tag) -> list[float]:
+    """The values of `tag`, rationals divided out; [] of text and of rationals that are no numbers."""
+    if isinstance(tag.values, bytes):
+        return []
+    if tag.kind != RATIONAL:
+        return [float(value) for value in tag.values]
+    pairs = list(zip(tag.values[::2], tag.values[1::2], strict=True))
+    return [n / d for n, d in pairs] if all(d for _, d in pairs) else []
 
 
 def kept_metadata(directories: Sequence[Mapping[int, Tag]], mosaic: Mapping[int, Tag]) -> Metadata:

@@ -52,6 +52,16 @@ def load_profile(name_or_path: str | Path) -> CameraProfile:
     return _parse(text, str(name_or_path))
 
 
+def load_bayer_profile(name_or_path: str | Path) -> CameraProfile:
+    """`load_profile` of a camera that makes mosaics; FsidError where it has no colour filters."""
+    profile = load_profile(name_or_path)
+    if profile.cfa == MONO:
+        raise FsidError(
+            f"{name_or_path}: is of a sensor without colour filters; give a Bayer camera's profile"
+        )
+    return profile
+
+
 def save_profile(path: str | Path, profile: CameraProfile) -> None:
     """Write `profile` as the YAML that `load_profile` reads (whole or not at all), numbers to 6 digits."""
     keys = ("name", "camera", "cfa", "bits", "black_level", "white_level", "date", "source", "notes")

@@ -1,11 +1,13 @@
 """Mean and variance over time of every pixel of a burst, from one frame after the other.
 
-    frame_f = gain_f (scene + noise) + offset_f,      change_f = (frame_f - offset_f) / gain_f - frame_0
+    frame_f = gain_f scene + offset_f + noise_f,      change_f = frame_f - offset_f - gain_f frame_0
 
 A lamp flickers and a black level drifts: gain and offset of a frame are those of its 8x8 block means against
 the first frame's, which hardly hold noise. They are used only where they exceed `SIGNIFICANT` standard
-errors, so that a steady burst is left alone and its variance unbiased. A block that still differs afterwards,
-and by enough to count as noise, has moved: it is left out, and where a quarter moved the burst is refused.
+errors, so that a steady burst is left alone and its variance unbiased. Changes are not divided by the gain:
+so the noise of frames counts as they have it, and mean and variance are both those of the burst's mean light.
+A block that still differs afterwards, and by enough to count as noise, has moved: it is left out, and where a
+quarter moved the burst is refused.
 
 Sums count from the first frame, so that they stay small. Memory is 22 bytes per pixel, however many frames.
 """
@@ -78,7 +80,6 @@ class TemporalStatistics:
             gain, offset = self._match(change, name)
             if (gain, offset) != (1.0, 0.0):
                 change += self._first * (1 - gain) - offset
-                change /= gain
             _check_white(np.where(self._whites, 0.0, np.sign(change)), name)
             if self._dark:
                 self._count_noise(change)
@@ -94,18 +95,27 @@ class TemporalStatistics:
         self._check()
         assert self._first is not None
         gain, offset = np.mean([1.0, *self.gains]), sum(self.offsets_dn) / self.frames
-        return gain * (self._first + self._sum / self.frames) + offset
+        return gain * self._first + self._sum / self.frames + offset
 
     def sites(self, cfa: str | None) -> list[tuple[np.ndarray, np.ndarray]]:
         """(mean, variance) in DN of the usable pixels of each site; of all pixels if `cfa` is None."""
         mean, usable = self.mean(), ~self._unusable()
+        freedom = (self.frames - 1) * self._counted_noise()
         places = [np.s_[:, :]] if cfa is None else [np.s_[r::2, c::2] for r, c in site_offsets(cfa)]
         found = []
         for place in places:
             keep = usable[place]
             total, squares = self._sum[place][keep], self._squares[place][keep]
-            found.append((mean[place][keep], (squares - total**2 / self.frames) / (self.frames - 1)))
+            found.append((mean[place][keep], (squares - total**2 / self.frames) / freedom))
         return found
+
+    def _counted_noise(self) -> float:
+        """How often the sum of squared changes holds the noise of each frame but one; 1 in steady light.
+
+        change_f - mean(change) = noise_f - mean(noise) - d_f noise_0,      d_f = gain_f - mean(gain)
+        """
+        deviations = np.array([1.0, *self.gains]) - np.mean([1.0, *self.gains])
+        return 1.0 + float((deviations**2).sum() - 2 * deviations[0]) / (self.frames - 1)
 
     @property
     def clipped_share(self) -> float:

@@ -6,6 +6,8 @@
     dark_current_e_s    slope of the dark level over exposure time, in electrons (k DN each)
     defective           share of dark pixels far from their neighbours
 
+All but the dark current are those of an ISO's shortest dark frames: longer ones hold its shot noise, too.
+
 Spatial variance is that of differences between neighbours of the same colour: vignetting is smooth and
 cancels. A term that does not stand out of its own error is left off. Poisson statistics and quantisation are
 no measurements: they are how sensors work, and stay the user's choice.
@@ -81,10 +83,11 @@ def prnu_of(stats: TemporalStatistics, black_dn: float, fixed_dn2: float) -> flo
 def fit_terms(
     dark: Sequence[DarkFinding], prnu: Sequence[float], k_dn_at_iso: dict[float, float]
 ) -> NoiseTerms:
-    """The mean of what the bursts of all ISOs show."""
+    """The mean of what the bursts of all ISOs show, the shortest dark one of each."""
+    shortest = [found for iso in {found.iso for found in dark} if (found := shortest_dark(dark, iso))]
 
     def mean(name: str) -> float:
-        return _rounded(float(np.mean([getattr(found.terms, name) for found in dark]))) if dark else 0.0
+        return _rounded(float(np.mean([getattr(f.terms, name) for f in shortest]))) if shortest else 0.0
 
     return NoiseTerms(
         row=mean("row"),
@@ -96,6 +99,12 @@ def fit_terms(
         prnu=_rounded(float(np.median(prnu))) if prnu else 0.0,
         dark_current_e_s=_dark_current(dark, k_dn_at_iso),
     )
+
+
+def shortest_dark(dark: Sequence[DarkFinding], iso: float) -> DarkFinding | None:
+    """The dark burst of an ISO that holds least dark current; None where it has none."""
+    of_iso = [found for found in dark if found.iso == iso]
+    return min(of_iso, key=lambda found: (found.exposure_s, found.level_dn), default=None)
 
 
 def _dark_current(dark: Sequence[DarkFinding], k_dn_at_iso: dict[float, float]) -> float:
