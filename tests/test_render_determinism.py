@@ -16,10 +16,11 @@ import pytest
 
 from fsid.assets import MATERIAL_VARIANTS, material_families
 from fsid.errors import FsidError
-from fsid.render import Frame, Renderer
+from fsid.render import Frame, GlInfo, Renderer, gpu_device
+from fsid.render.context import gl
 from fsid.render.layers import MOST_LAYERS, LayerStore, fitting_size
 from fsid.render.texels import bake_texels, level_ranges
-from fsid.render.texture_array import TextureArray, gl
+from fsid.render.texture_array import TextureArray
 from fsid.scene import LensConfig, LightConfig, MotionConfig, Scene, SceneConfig, sample
 
 CONFIG = SceneConfig(objects=(6, 8))
@@ -303,3 +304,13 @@ def test_the_size_of_tiles_follows_the_scene_alone(
     after = renderer.render(scene(1))
     assert (larger.radiance != before.radiance).any()
     np.testing.assert_array_equal(after.radiance, before.radiance)
+
+
+def test_gpus_are_counted_without_software_drivers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """EGL may list the CPU's driver before, between and after the GPUs."""
+    kinds = (True, False, True, False)
+    found = {i: GlInfo("", "", "", is_software=software) for i, software in enumerate(kinds)}
+    monkeypatch.setattr("fsid.render.context.egl_devices", lambda: found)
+    assert [gpu_device(number) for number in (0, 1)] == [1, 3]
+    with pytest.raises(FsidError, match="GPU 2 is needed, and OpenGL finds 2"):
+        gpu_device(2)

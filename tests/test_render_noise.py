@@ -24,10 +24,12 @@ import numpy as np
 import pytest
 from scipy.ndimage import maximum_filter, minimum_filter, uniform_filter
 
+from fsid.assets import MaterialMaps
 from fsid.render import Renderer
 from fsid.render.drawable import View
 from fsid.render.quality import tap_table
-from fsid.scene.model import Transform
+from fsid.render.texels import Texels, texels_of
+from fsid.scene.model import Material, Transform
 from fsid.sensor.profiles import load_profile, profile_names
 from render_scenes import FROM_ABOVE, bake_plain, block, grid, lambertian, point_light, sphere, view
 
@@ -107,3 +109,26 @@ def test_another_phase_gives_the_same_picture(renderer: Renderer) -> None:
     ids, difference = [frame.object_id for frame in frames], (before + after) / 2 - still
     check(difference, [still, before, after], ids, 0.95)
     assert grain(difference, still, smooth_in(images, ids, 0.03)) < LIMIT
+
+
+def test_filtered_textures_hold_no_steps(renderer: Renderer) -> None:
+    """A texel spans 26 pixels; between two of them the filter has to be finer than the texels' 8 bits."""
+
+    def bake_waves(family: str, variant: int, size: int) -> Texels:
+        wave = 0.5 + 0.5 * np.cos(2 * np.pi * np.arange(size, dtype=np.float32) / size)
+        maps = {name: np.full((size, size), 0.5, np.float32) for name in ("detail", "height")}
+        maps |= {name: np.zeros((size, size), np.float32) for name in ("pattern", "metallic")}
+        rough = np.ones((size, size), np.float32)
+        return texels_of(
+            MaterialMaps(mix=np.outer(wave, wave), roughness=rough, relief_m=0.001, tile_m=8.0, **maps)
+        )
+
+    material = Material("waves", 0, ((0.4,) * 3, (0.6,) * 3, (0.5,) * 3), 1.0, 0.0, 1.0, 1.0)
+    sheet = replace(lambertian(grid(6.0)), materials=(material,))
+    lit = view(sheet, ambient=0.5, camera=replace(FROM_ABOVE, width=480, height=480))
+    frames = [renderer.draw(lit, bake=bake_waves, shift_px=(s, s)) for s in (-0.21, 0.0, 0.21)]
+    before, still, after = images = [frame.radiance[..., 0].astype(float) for frame in frames]
+    smooth = smooth_in(images, [frame.object_id for frame in frames], 0.03)
+    assert smooth.mean() > 0.4
+    assert np.ptp(still) > 0.05 * still.mean()
+    assert grain((before + after) / 2 - still, still, smooth) < LIMIT

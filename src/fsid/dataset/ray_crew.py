@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 import socket
+from collections.abc import Sequence
 from typing import Any
 
 from fsid.dataset.crew import Lost, MakeWork, do_task, thread_limits
@@ -22,10 +23,16 @@ class _Member:
     def __init__(self, make_work: MakeWork, has_gpu: bool) -> None:
         import ray
 
-        self._work = make_work(int(ray.get_gpu_ids()[0]) if has_gpu else None)
+        self._work = make_work(_gpu_number(ray.get_gpu_ids()) if has_gpu else None)
 
     def do(self, task: Any) -> Any:
         return do_task(self._work, task)
+
+
+def _gpu_number(ids: Sequence[Any]) -> int | None:
+    """The number of the first of Ray's GPUs; None where it goes by names, as parts of a GPU do."""
+    first = str(ids[0]) if ids else ""
+    return int(first) if first.isdecimal() else None
 
 
 class RayCrew:

@@ -8,11 +8,11 @@ from typing import Any, Protocol
 
 from fsid.dataset.config import GenerateConfig
 from fsid.dataset.tasks import SceneRenderer
-from fsid.render import Renderer
+from fsid.render import Renderer, gpu_device
 
 
 class Worker:
-    """gpu: index of its GPU; None takes the first there is. Calling it does one task."""
+    """gpu: number of its GPU; None takes the first there is. Calling it does one task."""
 
     def __init__(self, gpu: int | None) -> None:
         self._gpu = gpu
@@ -40,7 +40,7 @@ def rendering(config: GenerateConfig, gpu: int | None = None) -> Iterator[SceneR
         yield ReferenceRenderer(texture_size=config.texture_px)
     else:
         with Renderer(
-            device_index=gpu,
+            device_index=None if gpu is None else gpu_device(gpu),
             supersampling=config.supersampling,
             texture_size=config.texture_px,
             quality=config.quality,

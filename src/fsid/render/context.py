@@ -8,7 +8,11 @@ unversioned ones exist only where development packages are installed.
 from __future__ import annotations
 
 import ctypes
+import os
+from collections.abc import Callable
+from ctypes import c_char_p, c_void_p
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import moderngl
@@ -20,6 +24,9 @@ _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3
 _LARGE_BYTES, _KEPT_BYTES = 2**20, 2**26
 _MAX_DEVICES = 16
 _SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swiftshader")
+os.environ.setdefault("GALLIVM_PERF", "no_aos_sampling")
+"""llvmpipe filters textures of 8 bits in 8 bits, in steps as large as read noise, unless it is told not to.
+It looks at this when the first context is made."""
 _HELP = (
     "install the Debian packages libegl1 libgl1 libgl1-mesa-dri for software rendering; in an NVIDIA "
     "container set NVIDIA_DRIVER_CAPABILITIES=graphics (or all) for the GPU"
@@ -74,6 +81,19 @@ def egl_devices() -> dict[int, GlInfo]:
     return found
 
 
+def gpu_device(number: int) -> int:
+    """EGL device index of the GPU with that number, counted without software drivers, which EGL lists too.
+
+    Not while a Renderer is open. FsidError where there are not as many GPUs.
+    """
+    gpus = [index for index, info in egl_devices().items() if not info.is_software]
+    if number >= len(gpus):
+        raise FsidError(
+            f"--workers-per-gpu: GPU {number} is needed, and OpenGL finds {len(gpus)} (fsid doctor)"
+        )
+    return gpus[number]
+
+
 def gl_info(context: moderngl.Context) -> GlInfo:
     """Vendor, device and version of the context."""
     info: dict[str, Any] = context.info
@@ -84,6 +104,14 @@ def gl_info(context: moderngl.Context) -> GlInfo:
         version=str(info["GL_VERSION"]),
         is_software=any(name in renderer.lower() for name in _SOFTWARE),
     )
+
+
+@cache
+def gl(name: str, *arguments: Any) -> Callable[..., None]:
+    """An OpenGL function of the current context that moderngl has no call for; arguments: ctypes."""
+    address = ctypes.CDLL("libEGL.so.1").eglGetProcAddress
+    address.restype, address.argtypes = c_void_p, [c_char_p]
+    return ctypes.CFUNCTYPE(None, *arguments)(address(name.encode()))
 
 
 def return_large_blocks() -> None:

@@ -9,6 +9,7 @@ it is, scaled likewise.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -26,12 +27,25 @@ _GROUND = 0.25
 
 def panorama(sky: Sky) -> np.ndarray:
     """(H, 2 H, 3) float32 radiance. Raises FsidError for a source that cannot be read."""
-    if sky.source == "procedural":
-        picture = _procedural(sky)
-    elif sky.source.startswith("file:"):
-        picture = _read(Path(sky.source.removeprefix("file:")))
-    else:
-        raise FsidError(f"scene.sky.source '{sky.source}': use 'procedural' or 'file:PATH'")
+    return _drawn(sky) if sky.source == "procedural" else _scaled(sky, _pictured(sky))
+
+
+@lru_cache(maxsize=2)
+def _drawn(sky: Sky) -> np.ndarray:
+    """A procedural sky, kept for the next image of the same scene."""
+    drawn = _scaled(sky, _procedural(sky))
+    drawn.flags.writeable = False
+    return drawn
+
+
+def _pictured(sky: Sky) -> np.ndarray:
+    if sky.source.startswith("file:"):
+        return _read(Path(sky.source.removeprefix("file:")))
+    raise FsidError(f"scene.sky.source '{sky.source}': use 'procedural' or 'file:PATH'")
+
+
+def _scaled(sky: Sky, picture: np.ndarray) -> np.ndarray:
+    """`picture` turned, its mean as the sky's."""
     elevation, _ = angles(len(picture))
     weight = np.cos(elevation) * (elevation > 0)
     mean = (picture * weight[:, None, None]).sum((0, 1)) / (weight.sum() * picture.shape[1])

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from ctypes import c_float, c_int, c_uint, c_void_p
 from typing import Any
 
 import moderngl
 import numpy as np
 
 from fsid.errors import FsidError
+from fsid.render.context import gl
 from fsid.render.frame import Frame
 
 _ID_LEVELS = 65535
 _STRIP = 64  # rows read at once
+_COLOUR, _DEPTH = 0x1800, 0x1801
 
 
 Place = tuple[int, int, int, int]
@@ -53,7 +56,7 @@ class Targets:
         self._depth = context.depth_texture(large)
         self._depth.compare_func = ""
         self._block_depth = context.texture(self.blocks, 2, dtype="f4")
-        self._open, self._blurred = (context.texture(self.blocks, n, dtype="f4") for n in (3, 2))
+        self._open, self._blurred = (context.texture(self.blocks, n, dtype="f4") for n in (4, 2))
         self._marks = context.depth_renderbuffer(size)
         self._results = [self._result(self._marks)]
         self._missing = [context.framebuffer([self._results[0][1]], self._marks)]
@@ -70,9 +73,10 @@ class Targets:
     def begin_samples(self, *, over: bool) -> None:
         """Draw the G-buffer, from nothing; or only what lies in front of the depth that is there."""
         self._to_samples.use()
-        self._to_samples.depth_mask = not over
-        self._to_samples.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
-        self._to_samples.depth_mask = True
+        clear = gl("glClearBufferuiv", c_uint, c_int, c_void_p)  # glClear is undefined for integers
+        clear(_COLOUR, 0, (c_uint * 4)())
+        if not over:
+            gl("glClearBufferfv", c_uint, c_int, c_void_p)(_DEPTH, 0, (c_float * 1)(1.0))
 
     def begin_overview(self, width: int) -> tuple[int, int]:
         """Draw a grid of places, `width` of them in a row; its size. Unit 0 holds the G-buffer."""

@@ -11,15 +11,13 @@ they were generated cost the base level's memory twice while the array is made.
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
-from ctypes import c_char_p, c_int, c_uint, c_void_p
-from functools import cache
-from typing import Any
+from ctypes import c_int, c_uint, c_void_p
 
 import moderngl
 import numpy as np
 
 from fsid.errors import FsidError
+from fsid.render.context import gl
 from fsid.render.texels import level_ranges
 
 _TEXTURE_2D_ARRAY, _TEXTURE0 = 0x8C1A, 0x84C0
@@ -72,11 +70,3 @@ class TextureArray:
     def release(self) -> None:
         """Give its memory back."""
         gl("glDeleteTextures", c_int, c_void_p)(1, ctypes.byref(self._name))
-
-
-@cache
-def gl(name: str, *arguments: Any) -> Callable[..., None]:
-    """An OpenGL function of the current context."""
-    address = ctypes.CDLL("libEGL.so.1").eglGetProcAddress
-    address.restype, address.argtypes = c_void_p, [c_char_p]
-    return ctypes.CFUNCTYPE(None, *arguments)(address(name.encode()))

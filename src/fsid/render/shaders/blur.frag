@@ -4,7 +4,7 @@ layout(binding = 0) uniform sampler2D openness;
 layout(binding = 1) uniform sampler2D blocks;   // of block_depth.frag
 uniform ivec2 direction;
 uniform ivec2 size;
-layout(location = 0) out vec3 result;
+layout(location = 0) out vec4 result;   // four: three of 32 bits need not be drawable
 
 const int REACH = 5;
 const float WEIGHTS[REACH + 1] = float[](252.0, 210.0, 120.0, 45.0, 10.0, 1.0);
@@ -21,5 +21,5 @@ void main() {
         sum += weight * o.x;
         total += weight;
     }
-    result = vec3(sum / total, centre.y, texelFetch(blocks, pixel, 0).g);
+    result = vec4(sum / total, centre.y, texelFetch(blocks, pixel, 0).g, 0.0);
 }

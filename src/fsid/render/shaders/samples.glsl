@@ -34,7 +34,7 @@ vec2 place_of(ivec2 pixel, int i) { return vec2(pixel) + (vec2(i % GRID, i / GRI
 bool alike(Sample a, Sample b) {
     return a.surface == b.surface && dot(a.face_normal, b.face_normal) > MIN_FACE_COSINE
         && dot(a.normal, b.normal) > MIN_NORMAL_COSINE
-        && abs(dot(a.position - b.position, a.face_normal)) < PLANE_TOLERANCE * a.depth;
+        && abs(dot(a.position - b.position, a.face_normal)) <= PLANE_TOLERANCE * a.depth;   // 0 = 0: the sky
 }
 
 // The samples still `open` that are like the first of them, as one; they are taken out of `open`. Its normal
