@@ -132,6 +132,7 @@ def test_a_folder_is_done_file_by_file(
     assert sorted(path.name for path in out.iterdir()) == ["a.dng", "b.dng"]
     assert read_raw(out / "a.dng").mosaic.shape == (256, 320)
     (folder / "aa.dng").write_text("broken")
+    (folder / "._a.dng").write_text("what a Mac leaves beside a.dng")
     with pytest.raises(SystemExit) as stop:
         main(["denoise", str(folder), str(tmp_path / "again"), "--model", str(network), "--quiet"])
     assert stop.value.code == 2
@@ -147,6 +148,34 @@ def test_a_folder_is_done_file_by_file(
     assert "overwritten" in told
     assert "0.nef" not in told
     assert {path: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def test_an_unreadable_file_is_left_out_of_a_folder(
+    tmp_path: Path, network: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, read = tmp_path / "in", fsid.sensor.dng._read_source
+    folder.mkdir()
+    for name in ("a", "b"):
+        write_dng(folder / f"{name}.dng", noisy_raw())
+
+    def refused(path: Path) -> object:
+        if path.name == "a.dng":
+            raise PermissionError(13, "Permission denied", str(path))
+        return read(path)
+
+    monkeypatch.setattr("fsid.sensor.dng._read_source", refused)
+    with pytest.raises(SystemExit) as stop:
+        main(["denoise", str(folder), str(tmp_path / "out"), "--model", str(network), "--quiet"])
+    assert stop.value.code == 2
+    assert "a.dng: cannot be read (Permission denied)" in capsys.readouterr().err
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["b.dng"]
+
+
+def test_a_picture_keeps_its_own_iso(noisy_file: Path, network: Path) -> None:
+    out = noisy_file.parent / "out.dng"
+    own = read_raw(noisy_file).iso
+    denoise_file(noisy_file, out, load_model(network), profile="pixel6", iso=2 * own)
+    assert read_raw(out).iso == own
 
 
 def test_an_original_is_not_overwritten(

@@ -79,6 +79,7 @@ def test_a_file_that_does_not_fit_is_named(tmp_path, name, write, size, words):
         ({"cfa": "RGB"}, "cfa"),
         ({"black_level": 5000}, "black"),
         ({"white_level": 70000}, "65535"),
+        ({"white_level": int(DN.max() / 1.5)}, "beyond the white level"),
         ({"white_balance": (0, 1, 1)}, "white_balance"),
     ],
 )

@@ -20,6 +20,7 @@ from fsid.sensor import (
     to_dn,
     write_dng,
 )
+from fsid.sensor.frames import find_frames
 
 PROFILE = load_profile("galaxy-s22")
 SIDE, FRAMES = 192, 20
@@ -193,6 +194,47 @@ def _fails(match, *arguments, **options):
 
 
 LAYOUT = Layout(iso=800, cfa=PROFILE.cfa, black_level=64, white_level=1023)
+
+
+def test_the_lowest_of_bare_dark_frames_is_the_black_level(tmp_path, rng):
+    """Bare mosaics state no exposure, and the long dark frames may come first by name."""
+    lit = write_arrays(tmp_path / "lit", [to_dn(raw) for raw in exposures(rng, scene(), 800, 10)])
+    short = [to_dn(raw) for raw in exposures(rng, scene(0.0), 800, 10)]
+    write_arrays(tmp_path / "dark" / "1s", [image + 30 for image in short])
+    write_arrays(tmp_path / "dark" / "20ms", short)
+    layout = replace(LAYOUT, black_level=None, iso=800)
+    found = calibrate(lit, name="mine", dark=[tmp_path / "dark"], layout=layout)
+    np.testing.assert_allclose(found.fits[0].black, 64, atol=0.5)
+
+
+def test_a_frame_counts_once_and_hidden_files_not_at_all(tmp_path, rng):
+    folder = tmp_path / "iso800" / "deeper"
+    frames = write_arrays(folder, [to_dn(raw) for raw in exposures(rng, scene(), 800, 5)])
+    (folder / ".DS_Store").write_bytes(b"no frame")
+    found = find_frames([tmp_path, *frames], [], LAYOUT)
+    assert [frame.path for frame in found.frames] == frames
+    assert {frame.iso for frame in found.frames} == {800}
+
+
+def test_what_levels_contradict_is_refused(tmp_path, rng):
+    lit = write_arrays(tmp_path / "lit", [to_dn(raw) for raw in exposures(rng, scene(), 800, 6)])
+    dark = write_arrays(tmp_path / "dark", [to_dn(raw) for raw in exposures(rng, scene(0.0), 800, 6)])
+    _fails("contradict --black-level 164", lit, dark=dark, layout=replace(LAYOUT, black_level=164))
+    _fails("below the black level, 164", lit, layout=replace(LAYOUT, black_level=164))
+    _fails("beyond the white level 400", lit, layout=replace(LAYOUT, white_level=400))
+    _fails("--iso -100", lit, layout=replace(LAYOUT, iso=-100))
+    light = np.linspace(0, 30, SIDE)
+    odd = [np.rint(90 + light + (6 - light / 6) * rng.normal(size=(SIDE, SIDE))) for _ in range(8)]
+    odd_files = write_arrays(tmp_path / "odd", [image.astype(np.uint16) for image in odd])
+    _fails("does not grow with light", odd_files, layout=LAYOUT)
+
+
+def test_raw_files_without_an_iso_are_noted_as_iso_100(tmp_path, rng):
+    for number, raw in enumerate(exposures(rng, scene(), 800, 6)):
+        write_dng(tmp_path / f"{number}.dng", replace(raw, iso=0.0))
+    found = calibrate([tmp_path], name="mine")
+    assert found.profile.iso == (100,)
+    assert any("no ISO known" in note for note in found.notes)
 
 
 def test_bad_bursts_are_named(tmp_path, dng_bursts, rng):

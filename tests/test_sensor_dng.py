@@ -148,23 +148,51 @@ def test_the_same_image_gives_the_same_bytes_and_a_loader_can_map_them(tmp_path)
         np.testing.assert_array_equal(mapped, to_dn(raw))
 
 
-def test_black_levels_of_each_site_are_subtracted_each(tmp_path):
-    """A camera whose four sites have blacks 60, 61, 62, 63 in the tile, and 1 DN of light everywhere."""
-    blacks = np.array([[60, 61], [62, 63]], np.uint16)
-    tags = [
-        (50706, "B", 4, bytes((1, 4, 0, 0)), True),
-        (50708, "s", 0, "Some camera", True),
-        (33421, "H", 2, (2, 2), True),
-        (33422, "B", 4, bytes((1, 2, 0, 1)), True),
-        (50713, "H", 2, (2, 2), True),
-        (50714, "I", 4, tuple(int(b) for b in blacks.ravel()), True),
-        (50717, "I", 1, 1023, True),
+def write_with_black(path, dn, *tags):
+    """A DNG of GBRG with those (code, type, count, values) and a white level of 1023."""
+    camera = [
+        (50706, "B", 4, bytes((1, 4, 0, 0))),
+        (50708, "s", 0, "Some camera"),
+        (33421, "H", 2, (2, 2)),
+        (33422, "B", 4, bytes((1, 2, 0, 1))),
+        (50717, "I", 1, 1023),
     ]
-    dn = np.tile(blacks, (16, 20)) + np.uint16(1)
-    tifffile.imwrite(tmp_path / "a.dng", dn, photometric="cfa", extratags=tags, metadata=None)
+    extra = [(*tag, True) for tag in (*camera, *tags)]
+    tifffile.imwrite(path, dn, photometric="cfa", extratags=extra, metadata=None)
+
+
+@pytest.mark.parametrize("side", [2, 4])
+def test_black_levels_of_each_site_are_subtracted_each(tmp_path, side):
+    """A camera whose sites have other blacks in a tile of 2 x 2 or 4 x 4, and 1 DN of light everywhere."""
+    blacks = 60 + np.arange(side * side, dtype=np.uint16).reshape(side, side)
+    repeat = (50713, "H", 2, (side, side))
+    levels = (50714, "I", side * side, tuple(int(b) for b in blacks.ravel()))
+    write_with_black(
+        tmp_path / "a.dng", np.tile(blacks, (32 // side, 40 // side)) + np.uint16(1), repeat, levels
+    )
     back = read_raw(tmp_path / "a.dng")
     assert back.cfa == "GBRG"
     np.testing.assert_allclose(back.mosaic, 1 / (1023 - back.black_level), rtol=1e-4)
+
+
+def test_fractions_of_a_black_level_are_kept(tmp_path):
+    """Phones state the mean of their dark pixels as a rational; a quarter of a DN tints shadows."""
+    levels = (50714, "2I", 4, (259, 4, 129, 2, 257, 4, 649, 10))
+    write_with_black(tmp_path / "a.dng", np.full((32, 40), 70, np.uint16), (50713, "H", 2, (2, 2)), levels)
+    back = read_raw(tmp_path / "a.dng")
+    dn = back.black_level + back.mosaic[:2, :2] * (1023 - back.black_level)
+    expected = 70 + back.black_level - np.array([[64.75, 64.5], [64.25, 64.9]])
+    np.testing.assert_allclose(dn, expected, atol=1e-3)
+
+
+def test_a_crop_ends_with_the_image(tmp_path):
+    """Of an odd number of columns the last one is dropped, and a crop of all of them has one less."""
+    crop = (50719, "H", 2, (0, 0)), (50720, "H", 2, (41, 32))
+    write_with_black(tmp_path / "a.dng", np.full((32, 41), 70, np.uint16), (50714, "H", 1, 64), *crop)
+    write_dng(tmp_path / "b.dng", read_raw(tmp_path / "a.dng"))
+    with tifffile.TiffFile(tmp_path / "b.dng") as file:
+        assert file.pages.first.shape == (32, 40)
+        assert tuple(file.pages.first.tags[50720].value) == (40, 1, 32, 1)
 
 
 def _write_other(path, kind):

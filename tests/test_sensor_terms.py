@@ -208,6 +208,25 @@ def test_calibration_finds_dark_current_and_drift_again(tmp_path, rng):
     assert (measured.row, measured.column, measured.poisson) == (0.0, 0.0, False)
 
 
+def test_terms_are_those_of_short_dark_frames(tmp_path, rng):
+    """Banding is told in parts of the read noise; the shot noise of dark current must not shrink it."""
+    terms, level = NoiseTerms(row=0.15, dark_current_e_s=20.0), NoiseLevel(LEVEL.k, (1e-4,) * 4)
+    ramp = flat(0.0, 96)
+    ramp.mosaic[:] = np.linspace(0, 0.8, 96, dtype=np.float32)
+    for name, clean, exposure_s in (
+        ("light", ramp, 0.02),
+        ("a", flat(0.0, 96), 1.0),
+        ("b", flat(0.0, 96), 0.02),
+    ):
+        (tmp_path / name).mkdir()
+        stated = replace(clean, metadata=exposure_metadata(exposure_s), camera="Maker Model")
+        for number in range(30):
+            noisy = noisy_from_clean(rng, stated, 800, level, terms, exposure_s=exposure_s)
+            write_dng(tmp_path / name / f"{number:03d}.dng", noisy)
+    found = calibrate([tmp_path / "light"], name="p", dark=[tmp_path / "a", tmp_path / "b"], terms=True)
+    assert found.profile.terms.row == pytest.approx(0.15, rel=0.2)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_a_camera_without_them_gets_no_terms(seed, tmp_path):
     rng = np.random.default_rng(seed)
