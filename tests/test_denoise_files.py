@@ -21,7 +21,7 @@ from fsid.denoise.export import export  # noqa: E402
 from fsid.denoise.files import denoise_file, noise_of  # noqa: E402
 from fsid.denoise.preview import PREVIEW_PX, preview_of  # noqa: E402
 from fsid.errors import FsidError  # noqa: E402
-from fsid.sensor import Raw, develop, load_profile, noisy_from_clean, read_raw, write_dng  # noqa: E402
+from fsid.sensor import Layout, Raw, develop, load_profile, noisy_from_clean, read_raw, write_dng  # noqa: E402
 from fsid.sensor.metadata import exposure_metadata  # noqa: E402
 
 PROFILE = load_profile("galaxy-s22")
@@ -213,6 +213,21 @@ def test_a_folder_of_bare_mosaics(
     main([*command, "--cfa", "GBRG", "--black-level", "64", "--white-level", "1023"])
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["a.dng", "b.dng"]
     assert read_raw(tmp_path / "out" / "a.dng").cfa == "GBRG"
+
+
+def test_what_no_reader_would_open_is_not_written(tmp_path: Path, network: Path) -> None:
+    np.save(tmp_path / "tiny.npy", np.full((20, 64), 500, np.uint16))
+    layout = Layout(None, "RGGB", 64, 1023)
+    with pytest.raises(FsidError, match=r"tiny.npy: is 64x20"):
+        denoise_file(
+            tmp_path / "tiny.npy",
+            tmp_path / "out.dng",
+            load_model(network),
+            profile="pixel6",
+            iso=800,
+            layout=layout,
+        )
+    assert not (tmp_path / "out.dng").exists()
 
 
 def test_a_large_preview_is_small(rng: np.random.Generator) -> None:

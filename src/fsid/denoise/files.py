@@ -29,6 +29,8 @@ RAW_SUFFIXES = frozenset(
     .rw2 .rwl .sr2 .srf .srw""".split()  # noqa: SIM905  a list of them would take a page
 )
 
+_SMALLEST_PX = 22  # LibRaw takes no smaller image for a RAW
+
 
 @dataclass(frozen=True)
 class Noise:
@@ -112,6 +114,11 @@ def denoise_file(
     if target.resolve() == source.resolve():
         raise FsidError(f"{target}: is the original, which would be overwritten; give another name")
     raw = read_input(source, layout)
+    if min(raw.mosaic.shape) < _SMALLEST_PX:
+        height, width = raw.mosaic.shape
+        raise FsidError(
+            f"{source}: is {width}x{height}; a DNG of less than {_SMALLEST_PX} pixels a side opens nowhere"
+        )
     noise = noise_of(raw, profile, iso, source)
     if iso is not None and not raw.iso > 0:
         raw = replace(raw, iso=iso)
