@@ -77,10 +77,6 @@ def _apart(tile: Tile, eye: np.ndarray, rays: np.ndarray) -> bool:
 
 def _behind(points: np.ndarray, apex: np.ndarray, edges: np.ndarray) -> bool:
     """Whether all points lie behind one side of a pyramid, whose edges are those of corners 00 01 10 11."""
-    middle = edges.sum(0)
-    for i, j in ((0, 1), (1, 3), (3, 2), (2, 0)):
-        inward = np.cross(edges[i], edges[j])
-        inward = inward if inward @ middle > 0 else -inward
-        if ((points - apex) @ inward < 0).all():
-            return True
-    return False
+    sides = np.cross(edges[[0, 1, 3, 2]], edges[[1, 3, 2, 0]])
+    inward = sides * np.where(sides @ edges.sum(0) > 0, 1.0, -1.0)[:, None]
+    return bool(((points - apex) @ inward.T < 0).all(axis=0).any())
