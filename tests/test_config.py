@@ -57,6 +57,9 @@ def test_saved_settings_load_back(tmp_path: Path):
         ("count.x=1", "count"),
         ("count", "count"),
         ("count=[", "count"),
+        ("count=2001-99-99", "count"),
+        ("count=!!bool foo", "count"),
+        pytest.param(f"count={'9' * 5000}", "count", id="too-many-digits"),
     ],
 )
 def test_a_mistake_is_one_line_that_names_the_key(override: str, named: str):
@@ -66,12 +69,37 @@ def test_a_mistake_is_one_line_that_names_the_key(override: str, named: str):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("text", ["[1, 2]", "a: [", "!!python/object/apply:os.system ['true']", "\x00"])
-def test_a_broken_file_is_one_line_that_names_it(tmp_path: Path, text: str):
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[1, 2]", "expected 'key: value' lines"),
+        ("a: [", "not valid YAML"),
+        ("!!python/object/apply:os.system ['true']", "not valid YAML"),
+        ("\x00", "not valid YAML"),
+        ("count: 2001-99-99", "month"),
+        ('count: !!int "abc"', "abc"),
+        ('count: !!int ""', "type that it states"),
+        ("count: 0x_", "not valid YAML"),
+        ("count: !!timestamp foo", "type that it states"),
+        ("count: !!bool foo", "type that it states"),
+        pytest.param("[" * 3000, "nested too deeply", id="deep"),
+        ("1: 2", "no such key: 1"),
+        ("count: 4\ncount: 5", "count is given twice"),
+        ("inner: {rate: 2, rate: 3}", "rate is given twice"),
+    ],
+)
+def test_a_broken_file_is_one_line_that_names_it(tmp_path: Path, text: str, words: str):
     file = tmp_path / "broken.yaml"
     file.write_text(text)
-    with pytest.raises(FsidError, match=r"broken\.yaml"):
+    with pytest.raises(FsidError, match=rf"broken\.yaml: .*{words}") as caught:
         load_settings(Outer, file)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_merged_key_may_be_overridden(tmp_path: Path):
+    file = tmp_path / "merged.yaml"
+    file.write_text("inner: {<<: {rate: 2, names: [x]}, rate: 3}")
+    assert load_settings(Outer, file).inner == Inner(3.0, ("x",))
 
 
 @pytest.mark.parametrize("plain", [["count"], None, 3, "count"])

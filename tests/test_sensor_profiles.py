@@ -182,6 +182,8 @@ def test_own_profile_by_path(tmp_path):
         ("[1.0e-04, 1.1", "[-1.0e-04, 1.1", "positive"),
         ("[4.0e-06", "[.nan", r"levels\[1\].sigma2"),
         ("levels:", "levels: [", "YAML"),
+        ("cfa: RGGB", "cfa: RGGB\ndate: 2001-99-99", "YAML"),
+        ("cfa: RGGB", "cfa: RGGB\ncfa: BGGR", "cfa is given twice"),
         ("    sigma2: [1.0", "    k_dn: [1.0, 1.0, 1.0, 1.0]\n    sigma2: [1.0", "k_dn"),
         ("cfa: RGGB", "cfa: RGGB\nxyz_to_camera: [[1, 2], [3]]", "xyz_to_camera"),
     ],

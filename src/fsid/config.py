@@ -2,8 +2,9 @@
 
     settings = defaults <- FILE (YAML) <- key=value, key=value ...
 
-`key` may be dotted (`scene.lights.count=2`) and `value` is YAML. A key that does not exist, or a value of
-the wrong type, is an error that names the key: a typing mistake must not silently train on defaults.
+`key` may be dotted (`scene.lights.count=2`) and `value` is YAML. A key that does not exist or is given twice,
+or a value of the wrong type, is an error that names the key: a typing mistake must not silently train on
+defaults.
 """
 
 from __future__ import annotations
@@ -100,7 +101,7 @@ def _first_reason(error: cattrs.BaseValidationError) -> str:
 
 def _reason(error: BaseException, kind: type | None) -> str:
     if isinstance(error, cattrs.ForbiddenExtraKeysError):
-        unknown = ", ".join(sorted(error.extra_fields))
+        unknown = ", ".join(sorted(map(str, error.extra_fields)))
         known = ", ".join(field.name for field in dataclasses.fields(error.cl))
         return f"no such key: {unknown} (there are: {known})"
     return str(error) if isinstance(error, ValueError) else f"expected {getattr(kind, '__name__', kind)}"
@@ -126,7 +127,7 @@ def load_settings(kind: type[T], file: Path | None = None, overrides: Sequence[s
         key, equals, text = override.partition("=")
         if not equals or not key:
             raise FsidError(f"--set {override}: expected key=value, for example --set width=1280")
-        _assign(plain, key.split("."), _yaml_value(override, text))
+        _assign(plain, key.split("."), parse_yaml(text, f"--set {key}"))
         source = f"{source} and --set" if file else "--set"
     return from_plain(kind, plain, source=source)
 
@@ -134,12 +135,12 @@ def load_settings(kind: type[T], file: Path | None = None, overrides: Sequence[s
 def read_yaml(file: Path) -> dict[str, Any]:
     """A YAML mapping, loaded safely; FsidError where it is missing, broken or something else."""
     try:
-        plain = yaml.safe_load(file.read_text(encoding="utf-8"))
+        text = file.read_text(encoding="utf-8")
     except OSError as error:
         raise FsidError(f"{file}: cannot be read ({error.strerror})") from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        line = " ".join(str(error).split())
-        raise FsidError(f"{file}: is not valid YAML ({line})") from None
+    except UnicodeDecodeError as error:
+        raise FsidError(f"{file}: is not valid YAML ({error})") from None
+    plain = parse_yaml(text, str(file))
     if plain is None:
         return {}
     if not isinstance(plain, dict):
@@ -153,11 +154,32 @@ def save_settings(settings: Any, file: Path) -> None:
     write_atomically(file, text.encode())
 
 
-def _yaml_value(override: str, text: str) -> Any:
+class _Loader(yaml.SafeLoader):
+    def compose_mapping_node(self, anchor: Any) -> yaml.MappingNode:
+        node = super().compose_mapping_node(anchor)
+        seen = set()
+        for key, _ in node.value:
+            if isinstance(key, yaml.ScalarNode):
+                if (key.tag, key.value) in seen:
+                    raise yaml.MarkedYAMLError(
+                        problem=f"{key.value} is given twice", problem_mark=key.start_mark
+                    )
+                seen.add((key.tag, key.value))
+        return node
+
+
+def parse_yaml(text: str, source: str) -> Any:
+    """What a YAML text holds, loaded safely; FsidError, naming `source`, where it is broken.
+
+    A key that is given twice is refused, too.
+    """
     try:
-        return yaml.safe_load(text)
-    except yaml.YAMLError:
-        raise FsidError(f"--set {override}: the value is not valid YAML") from None
+        return yaml.load(text, _Loader)
+    except (yaml.YAMLError, ValueError) as error:
+        reason = " ".join(str(error).split())
+    except Exception:  # PyYAML lets through whatever int(), datetime, a dict or the stack raise
+        reason = "a value is not of the type that it states, or nested too deeply"
+    raise FsidError(f"{source}: is not valid YAML ({reason})")
 
 
 def _assign(plain: dict[str, Any], path: list[str], value: Any) -> None:

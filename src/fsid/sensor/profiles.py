@@ -22,6 +22,7 @@ import numpy as np
 import yaml
 from numpy.polynomial.polynomial import polyval
 
+from fsid.config import parse_yaml
 from fsid.errors import FsidError
 from fsid.files import write_atomically
 from fsid.sensor.camera_profile import MONO, CameraProfile, Measurement, Optics
@@ -137,11 +138,7 @@ def _read(path: Path) -> str:
 
 
 def _parse(text: str, where: str) -> CameraProfile:
-    try:
-        data = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        first_line = str(error).splitlines()[0]
-        raise FsidError(f"{where}: not valid YAML: {first_line}") from error
+    data = parse_yaml(text, where)
     _check_keys(data, where, _REQUIRED, _OPTIONAL)
     white = _integer(data, "white_level", where, 1, 65535)
     black = _integer(data, "black_level", where, 0, white - 1)
