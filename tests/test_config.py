@@ -34,6 +34,11 @@ def test_later_overlays_win(tmp_path: Path):
     assert got == Outer(5, True, (1.0, 2.0), Inner(1e-3, ("x", "y")))
 
 
+def test_a_pair_is_taken_as_it_is_and_texts_are_yaml():
+    got = load_settings(Outer, None, [("inner.names", ["a #1"]), "count=4", ("count", 5), "inner.rate=2"])
+    assert got == Outer(5, inner=Inner(2.0, ("a #1",)))
+
+
 def test_saved_settings_load_back(tmp_path: Path):
     settings = Outer(count=7, inner=Inner(0.5, ("q",)))
     save_settings(settings, tmp_path / "c.yaml")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 import time
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from PIL import Image
 from fsid.cli.libraries import read_mesh_folders
 from fsid.cli.main import main
 from fsid.cli.progress import progress_bar
+from fsid.config import read_yaml
 from fsid.dataset import contact_sheet, generate_config, shard_path
 from fsid.dataset.sample import make_sample, to_uint8
 from fsid.dataset.shards import read_samples
@@ -142,6 +144,17 @@ def test_progress_shows_rate_time_left_and_failures(capsys: pytest.CaptureFixtur
     assert re.search(r"\d pairs/s", shown)
     assert re.search(r"\d:\d\d", shown)
     assert "worker 1 died" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["photos #1", "2024", "photos: a"])
+def test_a_folder_of_pictures_is_taken_as_typed(
+    data: Path, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(data / "pictures", name)
+    size = ["--width", "32", "--height", "32"]
+    main(["generate", "out", "--count", "1", "--images", name, *size, "--quiet"])
+    assert read_yaml(Path("out/config.yaml"))["generate"]["images"] == name
 
 
 def test_a_count_is_needed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -5,15 +5,21 @@ from __future__ import annotations
 import json
 import shutil
 import subprocess
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from fsid.cli.main import main
+from fsid.cli.progress import progress_bar
+from fsid.config import read_yaml
 from fsid.evaluate.compare import ImageRow
 from fsid.evaluate.dead_leaves import RADIUS_PX, dead_leaves_rand
 from fsid.evaluate.experiment_report import gaps
+from fsid.evaluate.experiments import PHOTOGRAPHS, _data, scale_config
+from fsid.sensor import load_profile, save_profile
 
 SMOKE = ("--scale", "smoke", "--count", "2", "--steps", "3", "--quiet")
 
@@ -61,6 +67,16 @@ def test_synthetic_against_real_goes_on_where_it_was_stopped(photos: Path, tmp_p
     with pytest.raises(SystemExit) as stop:
         main([*command, "--count", "3"])
     assert stop.value.code == 2
+
+
+def test_folders_and_cameras_are_taken_as_named(photos: Path, tmp_path: Path):
+    folder, camera = tmp_path / "photos #1", tmp_path / "my, camera.yaml"
+    shutil.copytree(photos, folder)
+    save_profile(camera, load_profile("pixel6"))
+    config = replace(scale_config("real-vs-synthetic", "smoke"), photos=str(folder), camera=str(camera))
+    data = _data(tmp_path, config, PHOTOGRAPHS, partial(progress_bar, quiet=True), workers=1)
+    generated = read_yaml(data / "config.yaml")["generate"]
+    assert (generated["images"], generated["cameras"]) == (str(folder), [str(camera)])
 
 
 @pytest.mark.parametrize(

@@ -21,6 +21,8 @@ from fsid.errors import FsidError
 from fsid.files import write_atomically
 
 T = TypeVar("T")
+Override = str | tuple[str, Any]
+"""A text `key=value`, whose value is YAML, or a pair (key, value), whose value is taken as it is."""
 
 
 def _strict_int(value: Any, _: type) -> int:
@@ -116,18 +118,16 @@ def _first_refusal(error: BaseException) -> FsidError | None:
     return None
 
 
-def load_settings(kind: type[T], file: Path | None = None, overrides: Sequence[str] = ()) -> T:
-    """Settings of dataclass `kind` from an optional YAML file and `key=value` overrides."""
+def load_settings(kind: type[T], file: Path | None = None, overrides: Sequence[Override] = ()) -> T:
+    """Settings of dataclass `kind` from an optional YAML file and overrides, of which the last wins."""
     plain: dict[str, Any] = {}
     source = "defaults"
     if file is not None:
         source = str(file)
         plain = read_yaml(file)
     for override in overrides:
-        key, equals, text = override.partition("=")
-        if not equals or not key:
-            raise FsidError(f"--set {override}: expected key=value, for example --set width=1280")
-        _assign(plain, key.split("."), parse_yaml(text, f"--set {key}"))
+        key, value = _parse_override(override) if isinstance(override, str) else override
+        _assign(plain, key.split("."), value)
         source = f"{source} and --set" if file else "--set"
     return from_plain(kind, plain, source=source)
 
@@ -180,6 +180,13 @@ def parse_yaml(text: str, source: str) -> Any:
     except Exception:  # PyYAML lets through whatever int(), datetime, a dict or the stack raise
         reason = "a value is not of the type that it states, or nested too deeply"
     raise FsidError(f"{source}: is not valid YAML ({reason})")
+
+
+def _parse_override(override: str) -> tuple[str, Any]:
+    key, equals, text = override.partition("=")
+    if not equals or not key:
+        raise FsidError(f"--set {override}: expected key=value, for example --set width=1280")
+    return key, parse_yaml(text, f"--set {key}")
 
 
 def _assign(plain: dict[str, Any], path: list[str], value: Any) -> None:

@@ -17,6 +17,7 @@ from fsid.cli.progress import progress_bar
 from fsid.errors import FsidError
 
 if TYPE_CHECKING:
+    from fsid.config import Override
     from fsid.dataset import GenerateConfig, Workforce
 
 Variant = Literal["objects", "materials", "objects-materials", "full"]
@@ -88,7 +89,7 @@ def generate(
         "quality": quality,
         "images": images and os.fspath(images),
     }
-    overrides = [*set, *(f"{key}={value}" for key, value in given.items() if value is not None)]
+    overrides: list[Override] = [*set, *((key, value) for key, value in given.items() if value is not None)]
     console = Console(stderr=True, quiet=quiet)
     if only:
         settings = generate_config(config, overrides) if config or overrides else None

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from importlib.resources import as_file, files
 from pathlib import Path
 
-from fsid.config import load_settings
+from fsid.config import Override, load_settings
 from fsid.errors import FsidError
 from fsid.scene import VARIANTS, SceneConfig
 
@@ -150,8 +150,8 @@ def split_of(config: GenerateConfig, number: int) -> str:
     return "validation" if every and number % every == every - 1 else "train"
 
 
-def generate_config(name_or_file: str | Path | None, overrides: Sequence[str] = ()) -> GenerateConfig:
-    """A built-in configuration by name (`fsid/configs`), or a YAML file; `key=value` overrides on top."""
+def generate_config(name_or_file: str | Path | None, overrides: Sequence[Override] = ()) -> GenerateConfig:
+    """A built-in configuration by name (`fsid/configs`), or a YAML file; overrides on top."""
     builtin = files("fsid.configs").joinpath(f"{name_or_file}.yaml")
     if name_or_file is None or not builtin.is_file():
         return load_settings(GenerateConfig, None if name_or_file is None else Path(name_or_file), overrides)

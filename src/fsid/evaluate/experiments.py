@@ -17,7 +17,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Literal
 
-from fsid.config import from_plain, load_settings, read_yaml, save_settings, to_plain
+from fsid.config import Override, from_plain, load_settings, read_yaml, save_settings, to_plain
 from fsid.dataset import GenerateConfig, find_pictures, generate
 from fsid.denoise import train, train_config
 from fsid.errors import FsidError
@@ -160,12 +160,16 @@ def _data(out: Path, config: ExperimentConfig, source: str, bar: ProgressBar, wo
     """The training pairs of a source."""
     data = out / "data" / source
     seed, count = config.seeds[0], config.count
-    overrides = [f"width={config.width}", f"height={config.height}", f"cameras=[{config.camera}]"]
+    overrides: list[Override] = [
+        ("width", config.width),
+        ("height", config.height),
+        ("cameras", [config.camera]),
+    ]
     if source in VARIANTS:
-        overrides += [f"variant={source}", *config.settings]
+        overrides += [("variant", source), *config.settings]
     elif source == PHOTOGRAPHS:
         photos = Path(config.photos).resolve()
-        overrides.append(f"images={photos}")
+        overrides.append(("images", str(photos)))
         count = max(count, len(find_pictures(photos)))
     else:
         pictures = out / "dead-leaves"
@@ -173,7 +177,7 @@ def _data(out: Path, config: ExperimentConfig, source: str, bar: ProgressBar, wo
             write_dead_leaves(
                 pictures, count, height=config.height, width=config.width, seed=seed, progress=progress
             )
-        overrides.append(f"images={pictures.resolve()}")
+        overrides.append(("images", str(pictures.resolve())))
     settings = load_settings(GenerateConfig, None, overrides)
     with bar(f"pairs from {source}", "pairs") as progress:
         generate(data, settings, count=count, seed=seed, workers=workers, progress=progress)
