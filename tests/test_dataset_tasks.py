@@ -8,10 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import tifffile
+from PIL import Image
 from scipy.ndimage import gaussian_filter, map_coordinates
 
 from fsid.config import load_settings
-from fsid.dataset import GenerateConfig, Sample, encode, make_sample
+from fsid.dataset import GenerateConfig, Sample, encode, make_sample, read_photo
 from fsid.dataset.pictures import read_exr
 from fsid.dataset.tasks import BURST_FRAMES
 from fsid.errors import FsidError
@@ -189,3 +191,26 @@ def test_bad_renders_are_named(tmp_path: Path) -> None:
     write_exr(tmp_path / "small.exr", np.ones((8, 64, 3), np.float32))
     with pytest.raises(FsidError, match=r"small\.exr: is 64x8"):
         read_exr(tmp_path / "small.exr")
+
+
+@pytest.mark.parametrize("name", ["grey.png", "grey.tif", "big-endian.tif", "turned.png"])
+def test_sixteen_bit_grey_keeps_its_values(name: str, tmp_path: Path) -> None:
+    levels = np.linspace(0, 65535, 40 * 32).reshape(40, 32).astype(np.uint16)
+    if name == "turned.png":
+        exif = Image.Exif()
+        exif[0x0112] = 3
+        Image.fromarray(levels[::-1, ::-1].copy()).save(tmp_path / name, exif=exif)
+    elif name == "big-endian.tif":
+        tifffile.imwrite(tmp_path / name, levels, byteorder=">")
+    else:
+        Image.fromarray(levels).save(tmp_path / name)
+    pixels = read_photo(tmp_path / name)
+    assert pixels.dtype == np.float32
+    np.testing.assert_allclose(pixels, np.stack([levels / 65535] * 3, axis=-1), atol=1e-6)
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.int32, np.int16])
+def test_photographs_of_other_numbers_are_refused(kind: type, tmp_path: Path) -> None:
+    tifffile.imwrite(tmp_path / "odd.tif", np.ones((40, 32), kind))
+    with pytest.raises(FsidError, match=r"odd\.tif: cannot be read as a photograph \(its values"):
+        read_photo(tmp_path / "odd.tif")

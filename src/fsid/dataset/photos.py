@@ -26,14 +26,24 @@ def read_photo(path: Path) -> np.ndarray:
     """(H, W, 3) float32 sRGB-encoded 0..1, upright, cropped to even size; FsidError where unreadable."""
     try:
         with Image.open(path) as image:
-            upright = ImageOps.exif_transpose(image).convert("RGB")
-            pixels = np.asarray(upright, np.float32) / np.float32(255.0)
+            pixels = _decoded(image)
     except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
         raise FsidError(f"{path}: cannot be read as a photograph ({error})") from None
     height, width = (size // 2 * 2 for size in pixels.shape[:2])
     if min(height, width) < 32:
         raise FsidError(f"{path}: is {pixels.shape[1]}x{pixels.shape[0]} pixels, at least 32x32 are needed")
     return pixels[:height, :width]
+
+
+def _decoded(image: Image.Image) -> np.ndarray:
+    """(H, W, 3) float32 0..1, upright; Pillow's own conversion of 16-bit grey would clip it to white."""
+    upright = ImageOps.exif_transpose(image)
+    if image.mode.startswith("I;16") or (image.mode, image.format) == ("I", "PNG"):
+        grey = np.asarray(upright, np.float32) / np.float32(65535.0)
+        return grey[..., None].repeat(3, axis=2)
+    if image.mode in ("I", "F"):
+        raise ValueError("its values are not 8-bit or 16-bit unsigned integers")
+    return np.asarray(upright.convert("RGB"), np.float32) / np.float32(255.0)
 
 
 def crop_rand(rng: np.random.Generator, pixels: np.ndarray, height: int, width: int) -> np.ndarray:
