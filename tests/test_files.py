@@ -1,9 +1,12 @@
 """A file appears whole or not at all, and nothing lies beside it afterwards."""
 
+import errno
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from fsid.dataset import save_png
 from fsid.errors import FsidError
 from fsid.files import write_atomically
 
@@ -25,6 +28,21 @@ def test_an_interrupted_write_leaves_the_old_file_and_nothing_else(
     with pytest.raises(KeyboardInterrupt):
         write_atomically(tmp_path / "a", b"new")
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {"a": b"old"}
+
+
+def test_a_picture_that_cannot_be_written_leaves_the_old_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    picture = np.zeros((2, 2, 3), np.uint8)
+    save_png(tmp_path / "a.png", picture)
+    before = (tmp_path / "a.png").read_bytes()
+    monkeypatch.setattr("fsid.files.os.replace", full)
+    with pytest.raises(FsidError, match=r"a\.png: cannot be written \(No space"):
+        save_png(tmp_path / "a.png", picture + 255)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {"a.png": before}
 
 
 def test_a_place_that_is_no_folder_is_one_line(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +14,7 @@ from fsid.dataset.config import GenerateConfig
 from fsid.dataset.sample import make_sample, to_uint8
 from fsid.dataset.worker import rendering
 from fsid.errors import FsidError
+from fsid.files import write_atomically
 from fsid.sensor import develop
 
 GAP_PX = 4
@@ -22,11 +24,9 @@ def save_png(path: Path, srgb: np.ndarray) -> None:
     """Write a (H, W, 3) sRGB image, 0..1 float or uint8, as PNG; FsidError where it cannot be written."""
     check_png(path)
     pixels = srgb if srgb.dtype == np.uint8 else to_uint8(srgb)
-    try:
-        Image.fromarray(pixels).save(path)
-    except OSError as error:
-        path.unlink(missing_ok=True)
-        raise FsidError(f"{path}: cannot be written ({error.strerror})") from None
+    buffer = io.BytesIO()
+    Image.fromarray(pixels).save(buffer, "PNG")
+    write_atomically(path, buffer.getvalue())
 
 
 def check_png(path: Path) -> None:
