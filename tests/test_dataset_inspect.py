@@ -1,12 +1,15 @@
 """Statistics of pictures: known answers, distances that behave like distances, and the command."""
 
 import json
+import os
+import shutil
 
 import numpy as np
 import pytest
 from PIL import Image
 
 from fsid.cli.main import main
+from fsid.dataset.inspect import inspect
 from fsid.dataset.statistics import TITLES, compare, distance, measure, pool, spectrum_slope
 
 
@@ -134,6 +137,15 @@ def test_photographs_and_the_dataset_made_from_them_are_seen_alike(photos, tmp_p
     colour = by_name["colour_texture"]
     assert colour["mean"] == pytest.approx(colour["reference_mean"], abs=0.02), "one skipped the camera"
     assert (tmp_path / "out" / "statistics.png").stat().st_size > 10_000
+
+
+def test_a_photograph_may_have_a_name_that_is_no_text(photos, tmp_path):
+    name = os.fsdecode(b"\xff.png")
+    try:
+        shutil.copy(photos / "0.png", tmp_path / name)
+    except OSError:
+        pytest.skip("this file system takes names in UTF-8 alone")
+    assert inspect(tmp_path).pictures == 1
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ photographs as they are, any RAW has too much colour in its texture. See `statis
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -129,7 +130,7 @@ def _stored_picture(stored: StoredMosaic) -> np.ndarray:
 
 def _photo_picture(path: Path) -> np.ndarray:
     """Colour and exposure are drawn anew for each photograph, by its name: the same in every run."""
-    rng = np.random.default_rng(list(path.name.encode()))
+    rng = np.random.default_rng(list(os.fsencode(path.name)))
     raw = clean_from_photo(rng, read_photo(path), load_profile(PHOTO_CAMERA))
     return _picture(raw.mosaic, raw.cfa, raw.white_balance, raw.xyz_to_camera)
 
