@@ -19,6 +19,7 @@ TASKS = ("denoise", "super-resolution", "deblur", "burst")
 RENDERERS = ("raster", "reference")
 QUALITIES = ("high", "fast")
 _POSITIVE = ("crops", "exposures", "noise_levels", "lens_images")
+_HIGHEST_ISO = 10_000_000
 
 
 @dataclass(frozen=True)
@@ -97,8 +98,8 @@ class GenerateConfig:
         if self.task == "burst" and self.renderer != "raster":
             raise FsidError(f"renderer: {self.renderer!r} knows no flow; --task burst needs raster")
         low, high = self.iso_range
-        if not 0 < low <= high:
-            raise FsidError(f"iso_range: [{low}, {high}] must be two positive numbers, the lower first")
+        if not 0 < low <= high <= _HIGHEST_ISO:
+            raise FsidError(f"iso_range: [{low}, {high}] must rise, above 0 and at most {_HIGHEST_ISO}")
         if not self.cameras:
             raise FsidError("cameras: at least one noise profile is needed")
         for key in _POSITIVE:
@@ -142,6 +143,10 @@ class DatasetConfig:
     shard_size: int
     generate: GenerateConfig
     pictures: int = 0
+
+    def __post_init__(self) -> None:
+        if self.seed < 0:
+            raise FsidError(f"seed {self.seed}: must not be negative")
 
 
 def split_of(config: GenerateConfig, number: int) -> str:

@@ -66,6 +66,8 @@ class TrainConfig:
         for key in ("warmup_steps", "weight_decay", "threads", "loader_processes", "seed", "held_out"):
             if getattr(self, key) < 0:
                 raise FsidError(f"{key}: must not be negative, got {getattr(self, key)}")
+        if self.seed >= 2**64:
+            raise FsidError(f"seed: must be below 2^64, got {self.seed}")
         if not 0 <= self.ema_decay < 1:
             raise FsidError(f"ema_decay: must be at least 0 and below 1, got {self.ema_decay}")
         if not 0 < self.iso_min <= self.iso_max:

@@ -83,6 +83,8 @@ class ExperimentConfig:
             raise FsidError("--count and --seeds must name at least one, --steps must not be negative")
         if len(set(self.seeds)) < len(self.seeds):
             raise FsidError(f"--seeds {' '.join(map(str, self.seeds))}: give different ones")
+        if not all(0 <= seed < 2**64 for seed in self.seeds):
+            raise FsidError(f"--seeds {' '.join(map(str, self.seeds))}: must be at least 0 and below 2^64")
         if self.kind == "real-vs-synthetic" and not self.photos:
             raise FsidError("--photos: name the folder of photographs that the real rival is trained on")
 

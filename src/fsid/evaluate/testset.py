@@ -61,6 +61,10 @@ class TestSet:
     notes: str
     frames: int = 1
 
+    def __post_init__(self) -> None:
+        if self.seed < 0:
+            raise FsidError(f"seed {self.seed}: must not be negative")
+
     def clean(self, root: Path, image: TestImage, level: str = "") -> Path:
         """Path of the truth of `image` (at `level`)."""
         own = root / image.name / f"{level}.clean.dng"
