@@ -59,6 +59,17 @@ def test_only_makes_the_same_bytes_from_a_key_and_from_json(data: Path, tmp_path
     assert loose(data / "elsewhere", "00000003") == stored
 
 
+@pytest.mark.parametrize("option", [["--seed", "5"], ["--width", "64"]])
+def test_only_makes_nothing_of_another_dataset(
+    data: Path, option: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = sorted(data.rglob("*"))
+    with pytest.raises(SystemExit):
+        main(["generate", str(data / "data"), "--only", "2", *option])
+    assert "another seed" in capsys.readouterr().err
+    assert sorted(data.rglob("*")) == before
+
+
 def test_a_contact_sheet_shows_the_samples_in_order_made_twice_as_large(photos: Path) -> None:
     """Pixel by pixel, fine texture behind a mosaic is full of false colour."""
     small, large = (
@@ -100,7 +111,15 @@ def test_meshes_that_are_skipped_are_counted_and_the_first_is_named(
 
 @pytest.mark.parametrize(
     ("only", "named"),
-    [("cat", "cat"), ("missing.json", "missing.json"), ("broken.json", "broken.json"), ("list.json", "JSON")],
+    [
+        ("cat", "cat"),
+        ("missing.json", "missing.json"),
+        ("broken.json", "broken.json"),
+        ("list.json", "JSON"),
+        ("3 --seed -1", "seed -1"),
+        ("3 --images nowhere", "nowhere"),
+        ("3 --dry-run", "--dry-run"),
+    ],
 )
 def test_only_names_what_is_wrong(
     only: str, named: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -109,7 +128,7 @@ def test_only_names_what_is_wrong(
     Path("broken.json").write_text("{")
     Path("list.json").write_text("[]")
     with pytest.raises(SystemExit) as exit_:
-        main(["generate", "out", "--only", only])
+        main(["generate", "out", "--only", *only.split()])
     assert exit_.value.code == 2
     assert named in capsys.readouterr().err
     assert not list(tmp_path.glob("out/*"))

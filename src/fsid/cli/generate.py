@@ -30,7 +30,7 @@ def generate(
     out: Positional[Path],
     *,
     count: int | None = None,
-    seed: int = 0,
+    seed: int | None = None,
     config: Path | None = None,
     set: tuple[str, ...] = (),
     width: int | None = None,
@@ -55,7 +55,7 @@ def generate(
     Args:
         out: Folder of the dataset.
         count: Number of pairs in the finished dataset.
-        seed: Seed of the dataset; pair i depends on settings, seed and i alone.
+        seed: Seed of the dataset; pair i depends on settings, seed and i alone (default 0).
         config: YAML file of settings, or the name of a built-in one (fsid-175k: the paper's dataset).
         set: Single settings, for example --set iso_range=[800,3200] scene.objects=[20,30] crops=4.
         width: Width of a frame in pixels (default 1920).
@@ -91,6 +91,8 @@ def generate(
     }
     overrides: list[Override] = [*set, *((key, value) for key, value in given.items() if value is not None)]
     console = Console(stderr=True, quiet=quiet)
+    if only and dry_run:
+        raise FsidError("--dry-run: says what a dataset takes, not one sample; leave out --only")
     if only:
         settings = generate_config(config, overrides) if config or overrides else None
         for path in make_only(out, only, settings, seed):
@@ -98,6 +100,7 @@ def generate(
         return
     if count is None or count < 1:
         raise FsidError("--count: say how many pairs the dataset is to have, at least 1")
+    seed = seed or 0
     settings, workforce = generate_config(config, overrides), Workforce(workers, ray, workers_per_gpu)
     dataset_config(settings, seed)  # names what does not exist before a library of meshes is read
     if not settings.images:

@@ -8,6 +8,7 @@ from pathlib import Path
 from fsid.config import from_plain, read_yaml
 from fsid.dataset.attempt import Sample
 from fsid.dataset.config import DatasetConfig, GenerateConfig
+from fsid.dataset.generate import dataset_config
 from fsid.dataset.sample import encode, make_sample, remake
 from fsid.dataset.shards import read_records, shard_path
 from fsid.dataset.worker import rendering
@@ -15,11 +16,12 @@ from fsid.errors import FsidError
 from fsid.files import write_atomically
 
 
-def make_only(out: Path, key: str, config: GenerateConfig | None, seed: int) -> list[Path]:
+def make_only(out: Path, key: str, config: GenerateConfig | None, seed: int | None) -> list[Path]:
     """Make the sample `key` into `out` as KEY.clean.dng, KEY.noisy.dng ...; the paths of its files.
 
     key: of a sample, or the path of its .json. config, seed: of the dataset; None takes those of the dataset
-    in `out`. Where the sample is in a shard of `out`, its record says what it is, redrawn or not.
+    in `out`, or the defaults where there is none. Where the sample is in a shard of `out`, its record says
+    what it is, redrawn or not. FsidError: unusable key or settings, or others than those of the dataset.
     """
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -43,20 +45,21 @@ def _from_json(file: Path) -> Sample:
     return _remake(record)
 
 
-def _from_key(out: Path, key: str, config: GenerateConfig | None, seed: int) -> Sample:
+def _from_key(out: Path, key: str, config: GenerateConfig | None, seed: int | None) -> Sample:
     if not key.isdecimal():
         raise FsidError(f"--only {key}: is neither the key of a sample, like 00000012, nor a .json file")
     index, file = int(key), out / "config.yaml"
     if file.exists():
         dataset = from_plain(DatasetConfig, read_yaml(file), source=str(file))
-        if config is not None and (config, seed) != (dataset.generate, dataset.seed):
+        if config not in (None, dataset.generate) or seed not in (None, dataset.seed):
             raise FsidError(f"{out}: holds a dataset of other settings or another seed; leave them out")
         config, seed = dataset.generate, dataset.seed
         shard = shard_path(out, index // dataset.shard_size)
         records = read_records(shard) if shard.exists() else iter(())
         if found := next((record for record in records if record["index"] == index), None):
             return _remake(found)
-    config = config or GenerateConfig()
+    config, seed = config or GenerateConfig(), seed or 0
+    dataset_config(config, seed)  # names what does not exist
     with rendering(config) as renderer:
         return make_sample(config, seed, index, renderer)
 
