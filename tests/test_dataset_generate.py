@@ -14,7 +14,7 @@ import pytest
 import rawpy
 import webdataset
 
-from fsid.config import load_settings
+from fsid.config import load_settings, read_yaml
 from fsid.dataset import GenerateConfig, generate, read_member, shard_keys, shard_path
 from fsid.errors import FsidError
 
@@ -68,6 +68,25 @@ def test_another_configuration_in_the_same_folder_is_refused(scenes: Path):
         generate(scenes, small("width=160"), count=4, seed=7, shard_size=2)
     with pytest.raises(FsidError, match=r"seed \(7 there, 9 here\)"):
         generate(scenes, small(), count=4, seed=9, shard_size=2)
+
+
+def test_the_corrected_command_goes_into_the_folder_of_the_one_that_failed(photos: Path, tmp_path: Path):
+    tiny = ("width=32", "height=32", f"images={photos}")
+    with pytest.raises(FsidError, match="deblur"):
+        generate(tmp_path, small(*tiny, "task=deblur"), count=1)
+    assert generate(tmp_path, small(*tiny), count=1) == 1
+    assert read_yaml(tmp_path / "config.yaml")["generate"]["task"] == "denoise"
+    shard_path(tmp_path, 0).unlink()
+    (tmp_path / "00000000.clean.dng").touch()
+    with pytest.raises(FsidError, match=r"generate\.task"):
+        generate(tmp_path, small(*tiny, "task=deblur"), count=1)
+
+
+def test_settings_of_something_else_are_not_replaced(photos: Path, tmp_path: Path):
+    (tmp_path / "config.yaml").write_text("steps: 30\n")
+    with pytest.raises(FsidError, match=r"config\.yaml: seed"):
+        generate(tmp_path, small(f"images={photos}"), count=1)
+    assert (tmp_path / "config.yaml").read_text() == "steps: 30\n"
 
 
 def test_a_pair_opens_in_libraw_and_differs_by_its_stated_noise(scenes: Path):

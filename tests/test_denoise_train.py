@@ -217,6 +217,23 @@ def test_a_folder_is_one_training_s_at_a_time(data: Path, tmp_path: Path) -> Non
     assert (run / "checkpoint.safetensors").exists()
 
 
+def test_the_corrected_command_goes_into_the_folder_of_the_one_that_failed(
+    data: Path, tmp_path: Path
+) -> None:
+    run, wrong = tmp_path / "run", replace(CONFIG, steps=1, validation_photos=str(tmp_path / "nowhere"))
+    with pytest.raises(FsidError, match="nowhere"):
+        train(data, run, wrong, quiet=True)
+    right = replace(wrong, validation_photos="")
+    with held(run, "another test is at work in it"), pytest.raises(FsidError, match="at work"):
+        train(data, run, right, quiet=True)
+    assert load_settings(TrainConfig, run / "config.yaml") == wrong
+    train(data, run, right, quiet=True)
+    assert load_settings(TrainConfig, run / "config.yaml") == right
+    (run / "checkpoint.safetensors").unlink()
+    with pytest.raises(FsidError, match="another validation_photos"):
+        train(data, run, wrong, quiet=True)
+
+
 def test_learning_rate_rises_and_falls() -> None:
     config = replace(CONFIG, steps=100, warmup_steps=10, learning_rate=1.0, final_rate=0.01)
     rates = [learning_rate(config, step) for step in range(100)]
@@ -235,6 +252,7 @@ def test_shipped_configs_are_valid(name: str) -> None:
 def test_bad_input_is_named(data: Path, tmp_path: Path) -> None:
     with pytest.raises(FsidError, match="no training to resume"):
         train(data, tmp_path / "run", CONFIG, resume=True)
+    assert not (tmp_path / "run").exists()
     with pytest.raises(FsidError, match="no-such"):
         train(tmp_path / "no-such", tmp_path / "run", CONFIG, quiet=True)
     train(data, tmp_path / "run", replace(CONFIG, steps=2), quiet=True)

@@ -164,18 +164,22 @@ def _withdraw_card(out: Path) -> None:
 
 
 def _claim(out: Path, dataset: DatasetConfig) -> None:
+    """`out` is of `dataset`, whatever a run that failed before its first shard left there."""
     file = out / "config.yaml"
     if not file.exists():
         save_settings(dataset, file)
         return
-    there = from_plain(DatasetConfig, read_yaml(file), source=str(file))
-    there, dataset = _used(there), _used(dataset)
-    if there != dataset:
-        keys = ", ".join(_differing(to_plain(there), to_plain(dataset)))
+    there = _used(from_plain(DatasetConfig, read_yaml(file), source=str(file)))
+    here = _used(dataset)
+    if there == here:
+        return
+    if any(out.glob("shard-*.tar")) or any(out.glob("*.clean.dng")):
+        keys = ", ".join(_differing(to_plain(there), to_plain(here)))
         raise FsidError(
             f"{out}: already holds another dataset; these differ: {keys}. "
             "Use another folder, or the same settings"
         )
+    save_settings(dataset, file)
 
 
 def _used(dataset: DatasetConfig) -> DatasetConfig:

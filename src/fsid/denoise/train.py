@@ -71,9 +71,11 @@ def train(
     is_main = accelerator.is_main_process
     kept = held_out(data_dir, config)
     patches = PatchDataset(data_dir, _patch_config(config, len(kept)), config.seed, accelerator.process_index)
-    with accelerator.main_process_first():
-        _prepare_run(run_dir, config, resume and is_main)
+    if resume and is_main and not (run_dir / CONFIG_FILE).is_file():
+        raise FsidError(f"{run_dir}: holds no training to resume")
     with held(run_dir, "another fsid train is at work in it") if is_main else nullcontext():
+        with accelerator.main_process_first():
+            _prepare_run(run_dir, config)
         torch.manual_seed(config.seed)
         net, optimizer = _prepare(accelerator, config)
         bare = accelerator.unwrap_model(net)
@@ -209,23 +211,24 @@ def mean_psnr(estimate: Tensor, clean: Tensor) -> Tensor:
     return -10 * torch.log10((estimate - clean).square().mean((1, 2, 3)) + 1e-12).mean()
 
 
-def _prepare_run(run_dir: Path, config: TrainConfig, resume: bool) -> None:
+def _prepare_run(run_dir: Path, config: TrainConfig) -> None:
+    """`run_dir` is of `config`, whatever a run that failed before its first network left there."""
     file = run_dir / CONFIG_FILE
     if file.is_file():
         old, new = (asdict(c) for c in (load_settings(TrainConfig, file), config))
-        if changed := [key for key in new if new[key] != old[key]]:
+        changed = [key for key in new if new[key] != old[key]]
+        if not changed:
+            return
+        if any(run_dir.glob("*.safetensors")):
             raise FsidError(
                 f"{file}: this run was started with another {', '.join(changed)}; "
                 "continue it with its own settings or give another folder"
             )
-    elif resume:
-        raise FsidError(f"{run_dir}: holds no training to resume")
-    else:
-        try:
-            run_dir.mkdir(parents=True, exist_ok=True)
-            save_settings(config, file)
-        except OSError as error:
-            raise FsidError(f"{run_dir}: cannot be written ({error.strerror})") from None
+    try:
+        run_dir.mkdir(parents=True, exist_ok=True)
+        save_settings(config, file)
+    except OSError as error:
+        raise FsidError(f"{run_dir}: cannot be written ({error.strerror})") from None
 
 
 def _patch_config(config: TrainConfig, held_out_images: int) -> PatchConfig:
