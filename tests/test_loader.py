@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import sys
+import tarfile
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -69,8 +71,6 @@ def equal(a: Batch, b: Batch) -> bool:
 
 
 def test_the_index_points_at_the_pixels_that_libraw_reads(dataset: Path, tmp_path: Path) -> None:
-    import tarfile
-
     for mosaic in index_mosaics(dataset):
         stored = np.fromfile(mosaic.shard, "<u2", mosaic.height * mosaic.width, offset=mosaic.offset)
         file = tmp_path / "one.dng"
@@ -174,6 +174,48 @@ def test_unusable_datasets_are_named(dataset: Path, tmp_path: Path) -> None:
     shard.write_bytes(shard.read_bytes()[:5000])
     with pytest.raises(FsidError, match=r"shard-00000\.tar"):
         index_mosaics(dataset)
+
+
+@pytest.mark.parametrize("key", ["./scene_a_0001", "abc", "../../evil", "9" * 5000])
+def test_a_key_that_is_no_number_is_named(key: str, tmp_path: Path) -> None:
+    image = io.BytesIO()
+    write_dng(image, raw(np.zeros((HEIGHT, WIDTH))))
+    with tarfile.open(shard_path(tmp_path, 0), "w") as tar:
+        member = tarfile.TarInfo(f"{key}.clean.dng")
+        member.size = len(image.getvalue())
+        tar.addfile(member, io.BytesIO(image.getvalue()))
+    assert [mosaic.scene for mosaic in index_mosaics(tmp_path)] == [0]
+    save_settings(DatasetConfig(0, 4, GenerateConfig()), tmp_path / "config.yaml")
+    with pytest.raises(FsidError, match=r"shard-00000\.tar: '.*' is no key") as caught:
+        index_mosaics(tmp_path)
+    assert key in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("settings", "named"),
+    [
+        *((f"generate: {value}", "generate") for value in ("null", "[]", "{crops: x}")),
+        *((f"pictures: {value}", "pictures") for value in ("x", "[1]", "null", ".nan", ".inf", "-1")),
+    ],
+)
+def test_settings_that_say_nothing_are_named(settings: str, named: str, dataset: Path) -> None:
+    (dataset / "config.yaml").write_text(settings)
+    with pytest.raises(FsidError, match=rf"config\.yaml: {named}"):
+        index_mosaics(dataset)
+
+
+@pytest.mark.parametrize(("black", "white"), [(500, 500), (0, 0), (900, 800)])
+def test_levels_that_are_no_range_are_named(
+    black: int, white: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    image = replace(raw(np.zeros((HEIGHT, WIDTH))), black_level=black, white_level=white)
+    quantise = sys.modules["fsid.sensor.quantise"]
+    monkeypatch.setattr(quantise, "check_levels", lambda *_: None)  # else it is not written
+    write_dataset(tmp_path, [image])
+    with pytest.raises(
+        FsidError, match=rf"00000000\.clean\.dng: black level {black} and white level {white}"
+    ):
+        index_mosaics(tmp_path)
 
 
 def addresses(tmp_path: Path, per_shard: tuple[int, ...]) -> Path:

@@ -8,6 +8,7 @@ tar file. Indexing reads tar and TIFF headers only.
 
 from __future__ import annotations
 
+import re
 import tarfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -17,15 +18,18 @@ from typing import Literal
 import tifffile
 
 from fsid.config import from_plain, read_yaml
-from fsid.dataset.config import GenerateConfig, split_of
+from fsid.dataset.config import DatasetConfig, split_of
 from fsid.dataset.shards import find_shards
 from fsid.errors import FsidError
 from fsid.sensor import dng_tags
 from fsid.sensor.mosaic import check_cfa
+from fsid.sensor.quantise import check_levels
 from fsid.sensor.raw import NoiseLevel
 
 _ORIGIN_KEYS = ("crops", "exposures", "noise_levels", "validation_every")
 """Settings that say which scene a sample is from; others may be those of another version of FSID."""
+
+_KEY = re.compile(r"[0-9]{1,18}")
 
 MosaicKind = Literal["clean", "noisy"]
 
@@ -62,7 +66,7 @@ def index_mosaics(data_dir: Path, kind: MosaicKind = "clean") -> tuple[StoredMos
         replace(mosaic, scene=scene, split=split)
         for shard in find_shards(data_dir)
         for mosaic in _index_shard(shard, f".{kind}.dng")
-        for scene, split in [origin(mosaic.key)]
+        for scene, split in [origin(mosaic)]
     )
     if not found:
         raise FsidError(
@@ -71,18 +75,27 @@ def index_mosaics(data_dir: Path, kind: MosaicKind = "clean") -> tuple[StoredMos
     return found
 
 
-def _origin(data_dir: Path) -> Callable[[str], tuple[int, str]]:
+def _origin(data_dir: Path) -> Callable[[StoredMosaic], tuple[int, str]]:
     """Scene and split of a sample by its key, from the config.yaml of the dataset, where there is one."""
     file = data_dir / "config.yaml"
     if not file.exists():
-        return lambda key: (int(key) if key.isdecimal() else 0, "train")
+        return lambda mosaic: (int(mosaic.key) if _KEY.fullmatch(mosaic.key) else 0, "train")
     plain = read_yaml(file)
-    known = {key: value for key, value in plain.get("generate", {}).items() if key in _ORIGIN_KEYS}
-    config = from_plain(GenerateConfig, known, source=str(file))
-    pictures = int(plain.get("pictures", 0))
+    known = plain.get("generate", {})
+    if isinstance(known, dict):
+        known = {key: value for key, value in known.items() if key in _ORIGIN_KEYS}
+    identity = {"seed": 0, "shard_size": 1, "generate": known, "pictures": plain.get("pictures", 0)}
+    dataset = from_plain(DatasetConfig, identity, source=str(file))
+    config, pictures = dataset.generate, dataset.pictures
+    if pictures < 0:
+        raise FsidError(f"{file}: pictures: {pictures} is negative")
 
-    def origin(key: str) -> tuple[int, str]:
-        frame = int(key) // config.pairs_per_frame
+    def origin(mosaic: StoredMosaic) -> tuple[int, str]:
+        if not _KEY.fullmatch(mosaic.key):
+            raise FsidError(
+                f"{mosaic.shard}: {mosaic.key!r} is no key that fsid generate gives, like 00000012"
+            )
+        frame = int(mosaic.key) // config.pairs_per_frame
         scene = frame % pictures if pictures else frame
         return scene, split_of(config, scene)
 
@@ -126,6 +139,7 @@ def _read_header(shard: Path, member: tarfile.TarInfo, key: str) -> StoredMosaic
         IndexError,
         ValueError,
         TypeError,
+        OverflowError,
         StopIteration,
     ) as error:
         raise FsidError(
@@ -135,6 +149,7 @@ def _read_header(shard: Path, member: tarfile.TarInfo, key: str) -> StoredMosaic
         raise FsidError(
             f"{where} is not one uncompressed little-endian uint16 strip; write it with `fsid generate`"
         )
+    check_levels(mosaic.black_level, mosaic.white_level, where)
     if mosaic.offset + 2 * mosaic.height * mosaic.width > member.offset_data + member.size:
         raise FsidError(f"{where} is truncated; delete the shard and generate again")
     return mosaic
