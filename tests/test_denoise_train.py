@@ -19,6 +19,7 @@ torch = pytest.importorskip("torch")
 from safetensors.torch import load_file, save_file  # noqa: E402
 
 from fsid.config import load_settings, save_settings  # noqa: E402
+from fsid.dataset import DatasetConfig, GenerateConfig  # noqa: E402
 from fsid.dataset.shards import shard_path, write_shard  # noqa: E402
 from fsid.denoise import (  # noqa: E402
     NetworkConfig,
@@ -232,6 +233,28 @@ def test_the_corrected_command_goes_into_the_folder_of_the_one_that_failed(
     (run / "checkpoint.safetensors").unlink()
     with pytest.raises(FsidError, match="another validation_photos"):
         train(data, run, wrong, quiet=True)
+
+
+@pytest.mark.parametrize("has_settings", [True, False])
+def test_a_run_stays_with_its_dataset(has_settings: bool, tmp_path: Path) -> None:
+    def dataset(name: str, seed: int, shards: int = 1) -> Path:
+        folder, rng = tmp_path / name, np.random.default_rng(seed)
+        folder.mkdir()
+        for shard in range(shards):
+            write_shard(shard_path(folder, shard), [stored(rng, 2 * shard + number) for number in range(2)])
+        if has_settings:
+            save_settings(DatasetConfig(seed, 2, GenerateConfig()), folder / "config.yaml")
+        return folder
+
+    run, one, other = tmp_path / "run", replace(CONFIG, steps=1), dataset("other", 2)
+    train(dataset("mine", 1), run, one, quiet=True)
+    with pytest.raises(FsidError, match=r"run: this run was started on other data than .*other"):
+        train(other, run, one, quiet=True)
+    train(dataset("mine, moved and grown", 1, shards=2), run, one, quiet=True)
+    sessions = run / "sessions.json"
+    older = [{key: row[key] for key in row if key != "data"} for row in json.loads(sessions.read_text())]
+    sessions.write_text(json.dumps(older))
+    train(other, run, one, quiet=True)
 
 
 def test_learning_rate_rises_and_falls() -> None:

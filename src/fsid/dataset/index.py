@@ -8,6 +8,7 @@ tar file. Indexing reads tar and TIFF headers only.
 
 from __future__ import annotations
 
+import hashlib
 import re
 import tarfile
 from collections.abc import Callable
@@ -73,6 +74,21 @@ def index_mosaics(data_dir: Path, kind: MosaicKind = "clean") -> tuple[StoredMos
             f"{data_dir}: its shards hold no *.{kind}.dng; make the dataset again with `fsid generate`"
         )
     return found
+
+
+def identity(data_dir: Path) -> str:
+    """What tells a dataset from others, wherever it lies and however far it has grown.
+
+    A digest of its config.yaml, or where there is none of its first clean image. FsidError as in
+    `index_mosaics`.
+    """
+    file = data_dir / "config.yaml"
+    if file.exists():
+        return hashlib.sha256(file.read_bytes()).hexdigest()
+    first = next(m for shard in find_shards(data_dir) for m in _index_shard(shard, ".clean.dng"))
+    with first.shard.open("rb") as pixels:
+        pixels.seek(first.offset)
+        return hashlib.sha256(pixels.read(2 * first.height * first.width)).hexdigest()
 
 
 def _origin(data_dir: Path) -> Callable[[StoredMosaic], tuple[int, str]]:

@@ -27,6 +27,7 @@ from torch import Tensor
 
 from fsid.config import load_settings, read_yaml, save_settings, to_plain
 from fsid.dataset.feed import batches
+from fsid.dataset.index import identity
 from fsid.dataset.loader import Batch, PatchConfig, PatchDataset
 from fsid.denoise.board import Board
 from fsid.denoise.checkpoint import TrainState, load_checkpoint, save_checkpoint
@@ -59,10 +60,11 @@ def train(
     """Train on `data_dir`'s shards; config, checkpoint, history, models go to `run_dir`. Path of the best.
 
     A run that is in `run_dir` already goes on from its checkpoint; it must have been started with the same
-    config. resume: insist that there is one. command: for the record of the run. progress(done, steps) is
-    called in place of the live line. Under `torchrun` or `accelerate launch` each process draws batches of
-    its own and gradients are averaged. Raises FsidError for unusable data or settings, another run in
-    `run_dir`, another process at work there, or a training that diverges.
+    config and dataset, which may have grown or moved. resume: insist that there is one. command: for the
+    record of the run. progress(done, steps) is called in place of the live line. Under `torchrun` or
+    `accelerate launch` each process draws batches of its own and gradients are averaged. Raises FsidError for
+    unusable data or settings, another run in `run_dir`, another process at work there, or a training that
+    diverges.
     """
     if config.threads:
         torch.set_num_threads(config.threads)
@@ -75,7 +77,7 @@ def train(
         raise FsidError(f"{run_dir}: holds no training to resume")
     with held(run_dir, "another fsid train is at work in it") if is_main else nullcontext():
         with accelerator.main_process_first():
-            _prepare_run(run_dir, config)
+            _prepare_run(data_dir, run_dir, config)
         torch.manual_seed(config.seed)
         net, optimizer = _prepare(accelerator, config)
         bare = accelerator.unwrap_model(net)
@@ -120,7 +122,7 @@ class _Keeper:
         self._validation = validation(held_out(data_dir, config) if main else (), config, accelerator.device)
         self._training = f"{images} images of {data_dir.resolve().name}"
         self._data = read_yaml(data_dir / CONFIG_FILE) if (data_dir / CONFIG_FILE).is_file() else {}
-        self._session = Session(run_dir, command, state.step, accelerator.num_processes)
+        self._session = Session(run_dir, command, state.step, accelerator.num_processes, identity(data_dir))
         self._board = Board(run_dir, state.step, wanted=config.tensorboard and main)
 
     def after_step(
@@ -211,19 +213,24 @@ def mean_psnr(estimate: Tensor, clean: Tensor) -> Tensor:
     return -10 * torch.log10((estimate - clean).square().mean((1, 2, 3)) + 1e-12).mean()
 
 
-def _prepare_run(run_dir: Path, config: TrainConfig) -> None:
-    """`run_dir` is of `config`, whatever a run that failed before its first network left there."""
+def _prepare_run(data_dir: Path, run_dir: Path, config: TrainConfig) -> None:
+    """`run_dir` is of `config` and data, whatever a run that failed before its first network left there."""
     file = run_dir / CONFIG_FILE
-    if file.is_file():
-        old, new = (asdict(c) for c in (load_settings(TrainConfig, file), config))
-        changed = [key for key in new if new[key] != old[key]]
-        if not changed:
-            return
-        if any(run_dir.glob("*.safetensors")):
+    there = load_settings(TrainConfig, file) if file.is_file() else None
+    if there is not None and any(run_dir.glob("*.safetensors")):
+        old, new = asdict(there), asdict(config)
+        if changed := [key for key in new if new[key] != old[key]]:
             raise FsidError(
                 f"{file}: this run was started with another {', '.join(changed)}; "
                 "continue it with its own settings or give another folder"
             )
+        data = identity(data_dir)
+        if any(row.get("data", data) != data for row in read_sessions(run_dir)):
+            raise FsidError(
+                f"{run_dir}: this run was started on other data than {data_dir}; "
+                "continue it with its own dataset or give another folder"
+            )
+        return
     try:
         run_dir.mkdir(parents=True, exist_ok=True)
         save_settings(config, file)
