@@ -272,6 +272,27 @@ def test_shipped_configs_are_valid(name: str) -> None:
         assert load_settings(TrainConfig, file).steps > 1
 
 
+@pytest.mark.parametrize(
+    "setting",
+    [
+        "betas=[2,3]",
+        "betas=[0.9,.nan]",
+        "weight_decay=.nan",
+        "weight_decay=.inf",
+        "batch=100000000",
+        "learning_rate=.inf",
+        "final_rate=.nan",
+        "final_rate=-1",
+        "iso_max=.inf",
+        "threads=100000",
+        "loader_processes=100000",
+    ],
+)
+def test_a_setting_that_no_training_survives_is_named(setting: str) -> None:
+    with pytest.raises(FsidError, match=setting.partition("=")[0]):
+        load_settings(TrainConfig, None, [setting])
+
+
 def test_bad_input_is_named(data: Path, tmp_path: Path) -> None:
     with pytest.raises(FsidError, match="no training to resume"):
         train(data, tmp_path / "run", CONFIG, resume=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from importlib.resources import as_file, files
@@ -11,6 +12,9 @@ from typing import Literal
 from fsid.config import load_settings
 from fsid.denoise.raw_denoiser import MAX_PATCH_PX, NetworkConfig
 from fsid.errors import FsidError
+
+_MAX_BATCH_PX = 2**28  # packed pixels, 4 GiB of patches
+_MAX_THREADS = 1024  # a system that runs out of them fails anywhere, with messages that make no sense
 
 
 @dataclass(frozen=True)
@@ -58,21 +62,32 @@ class TrainConfig:
         for key in ("steps", "batch", "patch_px", "log_every", "checkpoint_every", "validate_every"):
             if getattr(self, key) < 1:
                 raise FsidError(f"{key}: must be at least 1, got {getattr(self, key)}")
-        if self.patch_px > MAX_PATCH_PX:
-            raise FsidError(f"patch_px: must be at most {MAX_PATCH_PX}, got {self.patch_px}")
+        for key, most in (
+            ("patch_px", MAX_PATCH_PX),
+            ("batch", _MAX_BATCH_PX // self.patch_px**2),
+            ("threads", _MAX_THREADS),
+            ("loader_processes", _MAX_THREADS),
+        ):
+            if getattr(self, key) > most:
+                raise FsidError(f"{key}: must be at most {most}, got {getattr(self, key)}")
+        for key in ("learning_rate", "final_rate", "weight_decay"):
+            if not 0 <= getattr(self, key) < math.inf:
+                raise FsidError(f"{key}: must be finite and not negative, got {getattr(self, key)}")
         for key in ("learning_rate", "clip_norm"):
             if not getattr(self, key) > 0:
                 raise FsidError(f"{key}: must be above 0, got {getattr(self, key)}")
-        for key in ("warmup_steps", "weight_decay", "threads", "loader_processes", "seed", "held_out"):
+        for key in ("warmup_steps", "threads", "loader_processes", "seed", "held_out"):
             if getattr(self, key) < 0:
                 raise FsidError(f"{key}: must not be negative, got {getattr(self, key)}")
         if self.seed >= 2**64:
             raise FsidError(f"seed: must be below 2^64, got {self.seed}")
+        if not all(0 <= beta < 1 for beta in self.betas):
+            raise FsidError(f"betas: must be at least 0 and below 1, got {list(self.betas)}")
         if not 0 <= self.ema_decay < 1:
             raise FsidError(f"ema_decay: must be at least 0 and below 1, got {self.ema_decay}")
-        if not 0 < self.iso_min <= self.iso_max:
+        if not 0 < self.iso_min <= self.iso_max < math.inf:
             raise FsidError(
-                f"iso_min {self.iso_min} and iso_max {self.iso_max}: must satisfy 0 < iso_min <= iso_max"
+                f"iso_min {self.iso_min}, iso_max {self.iso_max}: must satisfy 0 < iso_min <= iso_max < inf"
             )
 
 
