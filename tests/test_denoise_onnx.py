@@ -164,6 +164,9 @@ def test_the_command_writes_a_smaller_form_and_denoise_runs_it(
             "--quiet",
         ]
     )
+    eight_bit = denoise_raw(few[0].noisy, load_onnx(small)).mosaic
+    off = np.abs(eight_bit - denoise_raw(few[0].noisy, denoiser).mosaic).max()
+    assert f"differs from PyTorch by {off:.1e}" in said
     expected = denoise_raw(read_raw(tmp_path / "noisy.dng"), denoiser).mosaic
     got = read_raw(tmp_path / "clean.dng").mosaic
     assert np.corrcoef(got.ravel(), expected.clip(max=1).ravel())[0, 1] > 0.98
