@@ -1,5 +1,6 @@
 """Statistics of pictures: known answers, distances that behave like distances, and the command."""
 
+import io
 import json
 import os
 import shutil
@@ -10,7 +11,10 @@ from PIL import Image
 
 from fsid.cli.main import main
 from fsid.dataset.inspect import inspect
+from fsid.dataset.shards import shard_path, write_shard
 from fsid.dataset.statistics import TITLES, compare, distance, measure, pool, spectrum_slope
+from fsid.errors import FsidError
+from fsid.sensor import Raw, write_dng
 
 
 def _noise(slope: float, size: int = 256, seed: int = 0) -> np.ndarray:
@@ -146,6 +150,38 @@ def test_a_photograph_may_have_a_name_that_is_no_text(photos, tmp_path):
     except OSError:
         pytest.skip("this file system takes names in UTF-8 alone")
     assert inspect(tmp_path).pictures == 1
+
+
+EYE = "[[1,0,0],[0,1,0],[0,0,1]]"
+
+
+@pytest.mark.parametrize(
+    "record",
+    [
+        b"{}",
+        b"[]",
+        b"null",
+        b"\xff\xfe",
+        b"{",
+        b"[" * 200_000,
+        *(
+            f'{{"white_balance": {balance}, "xyz_to_camera": {EYE}}}'.encode()
+            for balance in ("3", '"red"', "[1, 1]", "[0, 1, 1]", "[NaN, 1, 1]", "[1e300, 1, 1]")
+        ),
+        *(
+            f'{{"white_balance": [2, 1, 2], "xyz_to_camera": {matrix}}}'.encode()
+            for matrix in ("{}", "[[1, 0], [0, 1]]", "[[0,0,0],[0,0,0],[0,0,0]]", EYE.replace("1", "NaN"))
+        ),
+    ],
+    ids=lambda record: record[:70].decode("latin1"),
+)
+def test_a_sample_without_its_colours_is_named(record, tmp_path):
+    image = io.BytesIO()
+    write_dng(image, Raw(np.zeros((32, 32), np.float32), "RGGB", 0, 65535, (2.0, 1.0, 1.5), np.eye(3)))
+    write_shard(shard_path(tmp_path, 0), [("00000000", {"clean.dng": image.getvalue(), "json": record})])
+    with pytest.raises(FsidError, match=r"shard-00000\.tar: 00000000\.json: ") as caught:
+        inspect(tmp_path)
+    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(

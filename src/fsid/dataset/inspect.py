@@ -21,11 +21,12 @@ from numpy.typing import ArrayLike
 
 from fsid.dataset.index import StoredMosaic, index_mosaics
 from fsid.dataset.photos import find_photos, read_photo
-from fsid.dataset.shards import read_member
+from fsid.dataset.shards import read_member, read_record
 from fsid.dataset.statistics import Comparison, compare, measure, pool
 from fsid.errors import FsidError
 from fsid.files import write_atomically
 from fsid.sensor import camera_to_srgb_matrix, clean_from_photo, load_profile, pack, srgb_encode
+from fsid.sensor.colour import is_of_camera
 
 MAX_PICTURES = 400
 """Of a larger set, this many pictures are measured, evenly spaced."""
@@ -120,12 +121,28 @@ def _spaced(items: Sequence, limit: int) -> list:
 
 
 def _stored_picture(stored: StoredMosaic) -> np.ndarray:
-    record = json.loads(read_member(stored.shard, f"{stored.key}.json"))
+    balance, matrix = _colour(stored)
     levels = np.memmap(
         stored.shard, "<u2", mode="r", offset=stored.offset, shape=(stored.height, stored.width)
     )
     mosaic = (levels.astype(np.float32) - stored.black_level) / (stored.white_level - stored.black_level)
-    return _picture(mosaic, stored.cfa, record["white_balance"], record["xyz_to_camera"])
+    return _picture(mosaic, stored.cfa, balance, matrix)
+
+
+def _colour(stored: StoredMosaic) -> tuple[np.ndarray, np.ndarray]:
+    """White-balance gains (3,) and xyz_to_camera (3, 3) of a sample; FsidError where its JSON lacks them."""
+    name = f"{stored.key}.json"
+    where = f"{stored.shard}: {name}"
+    record = read_record(read_member(stored.shard, name), where)
+    try:
+        balance, matrix = (np.asarray(record[key], np.float64) for key in ("white_balance", "xyz_to_camera"))
+    except (KeyError, TypeError, ValueError):
+        raise FsidError(f"{where}: states no white_balance and xyz_to_camera") from None
+    if balance.shape != (3,) or not ((balance > 1e-3) & (balance < 1e3)).all():
+        raise FsidError(f"{where}: white_balance must be three gains between 0.001 and 1000")
+    if matrix.shape != (3, 3) or not is_of_camera(matrix):
+        raise FsidError(f"{where}: xyz_to_camera must be a 3x3 matrix with an inverse")
+    return balance, matrix
 
 
 def _photo_picture(path: Path) -> np.ndarray:

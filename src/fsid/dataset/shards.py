@@ -96,13 +96,21 @@ def read_samples(path: Path) -> dict[str, dict[str, bytes]]:
     return samples
 
 
+def read_record(data: bytes, where: str) -> dict[str, Any]:
+    """The content of a sample's JSON. FsidError, naming `where`, unless it is JSON of keys with values."""
+    try:
+        record = json.loads(data)
+    except (ValueError, RecursionError) as error:
+        raise FsidError(f"{where}: is not valid JSON ({error})") from None
+    if not isinstance(record, dict):
+        raise FsidError(f"{where}: is not the JSON of a sample; expected keys with values")
+    return record
+
+
 def read_records(path: Path) -> Iterator[dict[str, Any]]:
     """The content of the JSON of every sample of a shard. FsidError where it is not readable."""
     for name, data in _read(path, lambda name: name.endswith(".json")):
-        try:
-            yield json.loads(data)
-        except ValueError as error:
-            raise FsidError(f"{path}: {name} is not JSON ({error}); delete it and generate again") from None
+        yield read_record(data, f"{path}: {name}")
 
 
 def _read(path: Path, wanted: Callable[[str], bool]) -> Iterator[tuple[str, bytes]]:

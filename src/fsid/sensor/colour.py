@@ -25,6 +25,8 @@ SRGB_TO_XYZ = np.array(
 RED_GAIN_RANGE = (1.9, 2.4)  # Brooks et al. 2019, section 3.4
 BLUE_GAIN_RANGE = (1.5, 1.9)
 
+_MAX_CONDITION = 1e6  # of a matrix that can still be inverted in single precision; of cameras it is below 10
+
 
 @cache
 def published_matrices() -> np.ndarray:
@@ -44,6 +46,15 @@ def srgb_to_camera_matrix(xyz_to_camera: np.ndarray) -> np.ndarray:
 def camera_to_srgb_matrix(xyz_to_camera: np.ndarray) -> np.ndarray:
     """(3, 3) float64 white-balanced camera RGB -> linear sRGB (the CCM), rows summing to 1."""
     return np.linalg.inv(srgb_to_camera_matrix(xyz_to_camera))
+
+
+def is_of_camera(xyz_to_camera: np.ndarray) -> bool:
+    """Whether matrices (..., 3, 3) are finite, have an inverse, and see light where there is white."""
+    with np.errstate(all="ignore"):
+        matrix = xyz_to_camera @ SRGB_TO_XYZ
+    if not (np.isfinite(matrix).all() and (matrix.sum(axis=-1) > 0).all()):
+        return False
+    return bool((np.linalg.cond(matrix) < _MAX_CONDITION).all())
 
 
 def colour_rand(
