@@ -152,6 +152,11 @@ def test_a_photograph_may_have_a_name_that_is_no_text(photos, tmp_path):
     assert inspect(tmp_path).pictures == 1
 
 
+def test_halves_of_one_picture_are_no_yardstick(photos):
+    assert all(np.isnan(found.yardstick) for found in inspect(photos, photos, limit=3).comparisons)
+    assert any(np.isfinite(found.yardstick) for found in inspect(photos, photos).comparisons)
+
+
 EYE = "[[1,0,0],[0,1,0],[0,0,1]]"
 
 
@@ -191,6 +196,7 @@ def test_a_sample_without_its_colours_is_named(record, tmp_path):
         (["PHOTOS", "--reference", "nowhere"], "nowhere: is neither a dataset nor a folder"),
         (["PHOTOS", "--other", "PHOTOS"], "--other needs --reference"),
         (["PHOTOS", "--limit", "0"], "--limit 0"),
+        (["PHOTOS", "--reference", "PHOTOS", "--limit", "1"], "one picture has no spread"),
     ],
 )
 def test_bad_input_is_one_line(photos, arguments, words, capsys):

@@ -58,11 +58,14 @@ def inspect(
     """Measure `data`, and compare it with `reference`, both a dataset or a folder of photographs.
 
     other: a second real set, whose distance to the reference is the yardstick; without it the two halves of
-    the reference (every second picture) take its place. Raises FsidError.
+    the reference (every second picture) take its place, where it has four pictures or more. Raises FsidError,
+    also for a reference of one picture.
     """
     if limit < 1:
         raise FsidError(f"--limit {limit}: measure at least one picture")
     readers = [_reader(folder, limit) for folder in (data, reference, other) if folder is not None]
+    if reference is not None and len(readers[1][0]) < 2:
+        raise FsidError(f"{reference}: one picture has no spread to measure distances in; take more of them")
     total = sum(len(items) for items, _ in readers)
     measured: list[list[dict[str, np.ndarray]]] = []
     done = 0
@@ -78,7 +81,7 @@ def inspect(
     real = pool(measured[1])
     if other is not None:
         comparisons = compare(values, real, pool(measured[2]))
-    elif len(measured[1]) > 1:
+    elif len(measured[1]) > 3:
         halves = compare(pool(measured[1][::2]), pool(measured[1][1::2]))
         found = compare(values, real)
         comparisons = [
