@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 import time
@@ -15,7 +16,7 @@ from fsid.cli.libraries import read_mesh_folders
 from fsid.cli.main import main
 from fsid.cli.progress import progress_bar
 from fsid.config import read_yaml
-from fsid.dataset import contact_sheet, generate_config, shard_path
+from fsid.dataset import contact_sheet, generate_config, make_only, shard_path, write_shard
 from fsid.dataset.sample import make_sample, to_uint8
 from fsid.dataset.shards import read_samples
 from fsid.errors import FsidError
@@ -51,9 +52,9 @@ def test_only_makes_the_same_bytes_from_a_key_and_from_json(data: Path, tmp_path
     stored = read_samples(shard_path(data / "data", 0))["00000003"]
     main([*words(data)[:1], str(data / "data"), "--only", "00000003", "--quiet"])
     assert loose(data / "data", "00000003") == stored
-    json = tmp_path / "00000003.json"
-    json.write_bytes(stored["json"])
-    main(["generate", str(tmp_path / "again"), "--only", str(json), "--quiet"])
+    file = tmp_path / "00000003.json"
+    file.write_bytes(stored["json"])
+    main(["generate", str(tmp_path / "again"), "--only", str(file), "--quiet"])
     assert loose(tmp_path / "again", "00000003") == stored
     main([*(word.replace("/data", "/elsewhere") for word in words(data)), "--only", "3"])
     assert loose(data / "elsewhere", "00000003") == stored
@@ -110,9 +111,40 @@ def test_meshes_that_are_skipped_are_counted_and_the_first_is_named(
 
 
 @pytest.mark.parametrize(
+    ("lie", "named"),
+    [
+        *(({"index": value}, "index") for value in (-1, 1.5, "x", None)),
+        *(({"seed": value}, "seed") for value in (-1, 1.5, "x", None)),
+        ({"settings": None}, "settings"),
+        ({"settings": {"seed": 3}}, "settings"),
+        ({"refused": 3}, "JSON of a sample"),
+        ({"scene": {}}, "scene"),
+        (None, "JSON"),
+    ],
+    ids=str,
+)
+def test_a_record_that_lies_is_named(data: Path, lie: dict | None, named: str, tmp_path: Path) -> None:
+    record = json.loads(read_samples(shard_path(data / "data", 0))["00000003"]["json"])
+    file = tmp_path / "lie.json"
+    file.write_text("[" * 200_000 if lie is None else json.dumps(record | lie))
+    with pytest.raises(FsidError, match=rf"lie\.json: .*{named}"):
+        make_only(tmp_path / "out", str(file), None, 0)
+    assert not list((tmp_path / "out").iterdir())
+
+
+@pytest.mark.parametrize("record", [b"{}", b"null", b"[" * 200_000])
+def test_a_shard_whose_record_is_none_is_named(data: Path, record: bytes, tmp_path: Path) -> None:
+    shutil.copy(data / "data" / "config.yaml", tmp_path)
+    write_shard(shard_path(tmp_path, 0), [("00000001", {"json": record})])
+    with pytest.raises(FsidError, match=r"shard-00000\.tar"):
+        make_only(tmp_path, "00000001", None, 0)
+
+
+@pytest.mark.parametrize(
     ("only", "named"),
     [
         ("cat", "cat"),
+        ("9" * 5000, "999"),
         ("missing.json", "missing.json"),
         ("broken.json", "broken.json"),
         ("list.json", "JSON"),

@@ -45,14 +45,20 @@ def test_a_value_of_the_wrong_kind_is_named(data, value):
         scene_from_json(json.dumps(data))
 
 
-@pytest.mark.parametrize("value", [1.5, "1", True])
+@pytest.mark.parametrize("value", [1.5, "1", True, -1])
 def test_a_whole_number_stays_one(data, value):
     data["seed"] = value
     with pytest.raises(FsidError, match=r"scene\.seed"):
         scene_from_json(json.dumps(data))
 
 
-@pytest.mark.parametrize("text", ["", "{", "[]", "3"])
+def test_a_scene_has_a_camera(data):
+    data["cameras"] = []
+    with pytest.raises(FsidError, match=r"scene\.cameras"):
+        scene_from_json(json.dumps(data))
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "3", "[" * 200_000])
 def test_other_text_is_refused_in_one_line(text):
     with pytest.raises(FsidError, match="scene") as caught:
         scene_from_json(text)

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
+from typing import Any
 
 from fsid.config import from_plain, read_yaml
 from fsid.dataset.attempt import Sample
 from fsid.dataset.config import DatasetConfig, GenerateConfig
 from fsid.dataset.generate import dataset_config
 from fsid.dataset.sample import encode, make_sample, remake
-from fsid.dataset.shards import read_records, shard_path
+from fsid.dataset.shards import read_record, read_records, shard_path
 from fsid.dataset.worker import rendering
 from fsid.errors import FsidError
 from fsid.files import write_atomically
+
+_KEY_DIGITS = 18  # at most; Python turns no text of thousands of digits into a number
 
 
 def make_only(out: Path, key: str, config: GenerateConfig | None, seed: int | None) -> list[Path]:
@@ -37,16 +39,14 @@ def make_only(out: Path, key: str, config: GenerateConfig | None, seed: int | No
 
 def _from_json(file: Path) -> Sample:
     try:
-        record = json.loads(file.read_text(encoding="utf-8"))
+        data = file.read_bytes()
     except OSError as error:
         raise FsidError(f"{file}: cannot be read ({error.strerror})") from None
-    except ValueError as error:
-        raise FsidError(f"{file}: is not valid JSON ({error})") from None
-    return _remake(record)
+    return _remake(read_record(data, str(file)), str(file))
 
 
 def _from_key(out: Path, key: str, config: GenerateConfig | None, seed: int | None) -> Sample:
-    if not key.isdecimal():
+    if not (key.isdecimal() and len(key) <= _KEY_DIGITS):
         raise FsidError(f"--only {key}: is neither the key of a sample, like 00000012, nor a .json file")
     index, file = int(key), out / "config.yaml"
     if file.exists():
@@ -56,16 +56,24 @@ def _from_key(out: Path, key: str, config: GenerateConfig | None, seed: int | No
         config, seed = dataset.generate, dataset.seed
         shard = shard_path(out, index // dataset.shard_size)
         records = read_records(shard) if shard.exists() else iter(())
-        if found := next((record for record in records if record["index"] == index), None):
-            return _remake(found)
+        try:
+            found = next((record for record in records if record["index"] == index), None)
+        except KeyError:
+            raise FsidError(
+                f"{shard}: a sample's JSON states no index; delete it and generate again"
+            ) from None
+        if found is not None:
+            return _remake(found, f"{shard}: sample {index}")
     config, seed = config or GenerateConfig(), seed or 0
     dataset_config(config, seed)  # names what does not exist
     with rendering(config) as renderer:
         return make_sample(config, seed, index, renderer)
 
 
-def _remake(record: dict) -> Sample:
-    settings = record.get("settings") if isinstance(record, dict) else None
-    config = from_plain(GenerateConfig, settings or {}, source="settings")
+def _remake(record: dict[str, Any], where: str) -> Sample:
+    config = from_plain(GenerateConfig, record.get("settings"), source=f"{where}: settings")
     with rendering(config) as renderer:
-        return remake(record, renderer)
+        try:
+            return remake(record, renderer)
+        except FsidError as error:
+            raise FsidError(f"{where}: {error}") from None

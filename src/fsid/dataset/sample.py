@@ -16,7 +16,7 @@ import numpy as np
 from PIL import Image
 
 from fsid.config import from_plain
-from fsid.dataset.attempt import Attempt, Sample
+from fsid.dataset.attempt import Attempt, Sample, sample_key
 from fsid.dataset.config import GenerateConfig
 from fsid.dataset.tasks import SceneRenderer
 from fsid.errors import FsidError
@@ -67,15 +67,23 @@ def remake(record: dict[str, Any], renderer: SceneRenderer | None) -> Sample:
     """The sample that `record`, the content of its JSON, describes; FsidError where that is not complete."""
     try:
         config = from_plain(GenerateConfig, record["settings"], source="settings")
-        frame, place = divmod(record["index"], config.pairs_per_frame)
+        index, seed = (_whole(record, key) for key in ("index", "seed"))
+        frame, place = divmod(index, config.pairs_per_frame)
         scene = scene_from_json(json.dumps(record["scene"])) if "scene" in record else None
-        attempt = Attempt(config, record["seed"], frame, tuple(record["refused"]), scene)
-    except (KeyError, TypeError) as error:
+        attempt = Attempt(config, seed, frame, tuple(record["refused"]), scene)
+    except (KeyError, TypeError, RecursionError) as error:
         raise FsidError(f"this is not the JSON of a sample that fsid generate wrote ({error})") from None
     samples = attempt.samples(renderer)
     if isinstance(samples, str):
-        raise FsidError(f"sample {record['key']}: cannot be made again, the checks now find it {samples}")
+        raise FsidError(f"sample {sample_key(index)}: cannot be made again, the checks now find it {samples}")
     return samples[place]
+
+
+def _whole(record: dict[str, Any], key: str) -> int:
+    value = record[key]
+    if isinstance(value, bool) or not isinstance(value, int) or value < 0:
+        raise FsidError(f"{key}: {value!r} is not a whole number of at least 0")
+    return value
 
 
 def encode(sample: Sample) -> dict[str, bytes]:

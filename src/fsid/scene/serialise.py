@@ -29,7 +29,10 @@ def scene_from_json(text: str) -> Scene:
         data = json.loads(text)
     except json.JSONDecodeError as error:
         raise FsidError(f"scene JSON: not valid at line {error.lineno}: {error.msg}") from None
+    except RecursionError:
+        raise FsidError("scene JSON: is nested too deeply") from None
     scene: Scene = _read(Scene, data, "scene")
+    _expect(len(scene.cameras) > 0, "scene.cameras", "at least one")
     for key in ("materials", "transforms"):
         _expect(len(getattr(scene, key)) == len(scene.objects), f"scene.{key}", "as long as scene.objects")
     _expect(
@@ -63,6 +66,7 @@ def _read(kind: Any, data: Any, where: str) -> Any:
         return float(data)
     is_kind = isinstance(data, kind) and isinstance(data, bool) == (kind is bool)
     _expect(is_kind, where, f"of type {kind.__name__}")
+    _expect(kind is not int or data >= 0, where, "at least 0")
     return data
 
 
