@@ -171,7 +171,15 @@ EYE = "[[1,0,0],[0,1,0],[0,0,1]]"
         b"[" * 200_000,
         *(
             f'{{"white_balance": {balance}, "xyz_to_camera": {EYE}}}'.encode()
-            for balance in ("3", '"red"', "[1, 1]", "[0, 1, 1]", "[NaN, 1, 1]", "[1e300, 1, 1]")
+            for balance in (
+                "3",
+                '"red"',
+                "[1, 1]",
+                "[0, 1, 1]",
+                "[NaN, 1, 1]",
+                "[1e300, 1, 1]",
+                f"[1{'0' * 400}, 1, 1]",
+            )
         ),
         *(
             f'{{"white_balance": [2, 1, 2], "xyz_to_camera": {matrix}}}'.encode()

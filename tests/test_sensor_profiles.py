@@ -2,6 +2,7 @@
 
 import json
 import pickle
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -186,6 +187,21 @@ def test_own_profile_by_path(tmp_path):
         ("cfa: RGGB", "cfa: RGGB\ncfa: BGGR", "cfa is given twice"),
         ("    sigma2: [1.0", "    k_dn: [1.0, 1.0, 1.0, 1.0]\n    sigma2: [1.0", "k_dn"),
         ("cfa: RGGB", "cfa: RGGB\nxyz_to_camera: [[1, 2], [3]]", "xyz_to_camera"),
+        ("k: [1.0e-04", "k: [1.0e+300", r"levels\[0\]: k \+ sigma2"),
+        ("k: [1.0e-04", "k: [.inf", r"levels\[0\].k must"),
+        ("k: [1.0e-04", f"k: [1{'0' * 400}", r"levels\[0\].k must"),
+        ("sigma2: [1.0e-06", "sigma2: [2.0", r"levels\[0\]: k \+ sigma2"),
+        ("sigma2: [1.0e-06", "sigma2: [-0.5", r"levels\[0\]: k \+ sigma2"),
+        *(
+            ("cfa: RGGB", f"cfa: RGGB\nxyz_to_camera: {matrices}", "xyz_to_camera")
+            for matrices in (
+                "[]",
+                "[[[0, 0, 0], [0, 0, 0], [0, 0, 0]]]",
+                "[[[1, 2, 3], [1, 2, 3], [0, 0, 1]]]",
+                "[[[1.0e+308, 0, 0], [0, 1, 0], [0, 0, 1]]]",
+                f"[[[1{'0' * 400}, 0, 0], [0, 1, 0], [0, 0, 1]]]",
+            )
+        ),
     ],
 )
 def test_a_wrong_profile_names_file_and_key(tmp_path, old, new, words):
@@ -196,6 +212,16 @@ def test_a_wrong_profile_names_file_and_key(tmp_path, old, new, words):
         load_profile(path)
     assert "wrong.yaml" in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("value", "is_refused"), [("0.0", False), ("-1.0e-06", True)])
+def test_read_noise_that_is_negative_everywhere_is_refused(tmp_path, value, is_refused):
+    path = tmp_path / "mine.yaml"
+    path.write_text(
+        GOOD.replace("sigma2: [1.0e-06", f"sigma2: [{value}").replace("sigma2: [4.0e-06", f"sigma2: [{value}")
+    )
+    with pytest.raises(FsidError, match=r"mine\.yaml: levels: .*sigma2") if is_refused else nullcontext():
+        load_profile(path)
 
 
 def test_an_unknown_name_lists_the_known_ones():

@@ -139,7 +139,7 @@ def _colour(stored: StoredMosaic) -> tuple[np.ndarray, np.ndarray]:
     record = read_record(read_member(stored.shard, name), where)
     try:
         balance, matrix = (np.asarray(record[key], np.float64) for key in ("white_balance", "xyz_to_camera"))
-    except (KeyError, TypeError, ValueError):
+    except (KeyError, TypeError, ValueError, OverflowError):
         raise FsidError(f"{where}: states no white_balance and xyz_to_camera") from None
     if balance.shape != (3,) or not ((balance > 1e-3) & (balance < 1e3)).all():
         raise FsidError(f"{where}: white_balance must be three gains between 0.001 and 1000")

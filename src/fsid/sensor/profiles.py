@@ -26,7 +26,7 @@ from fsid.config import parse_yaml
 from fsid.errors import FsidError
 from fsid.files import write_atomically
 from fsid.sensor.camera_profile import MONO, CameraProfile, Measurement, Optics
-from fsid.sensor.colour import published_matrices
+from fsid.sensor.colour import is_of_camera, published_matrices
 from fsid.sensor.iso_law import k_law, sigma2_law
 from fsid.sensor.mosaic import check_cfa
 from fsid.sensor.quantise import ROUNDING_DN2
@@ -35,6 +35,7 @@ from fsid.sensor.terms import PAPER, NoiseTerms, parse_terms
 _REQUIRED = {"name", "camera", "cfa", "bits", "black_level", "white_level", "levels"}
 _OPTIONAL = {"source", "notes", "date", "xyz_to_camera", "law", "terms", "optics"}
 _MEASURED = {"k_error", "sigma2_error", "black", "frames", "dark_frames"}
+_LARGEST = 1e300  # of any number; beyond it are infinity and integers that are no float
 _DN_TOLERANCE = 0.01  # k_dn and sigma2_dn repeat k and sigma2; they may differ by rounding only
 
 
@@ -179,8 +180,12 @@ def _levels(entries: Any, where: str, span: int) -> tuple[tuple[float, ...], np.
         sigma2.append(_site_values(entry, "sigma2", here, span**2))
         if min(k[-1]) <= 0:
             raise FsidError(f"{here}.k: the gain of every site must be positive")
+        if not all(0 < variance <= 1 for variance in np.add(k[-1], sigma2[-1])):
+            raise FsidError(f"{here}: k + sigma2, the variance at white, must be above 0 and at most 1")
     if iso[0] <= 0 or any(b <= a for a, b in pairwise(iso)):
         raise FsidError(f"{where}: levels must be in order of rising, positive iso; got {iso}")
+    if np.max(sigma2, axis=0).min() < 0:
+        raise FsidError(f"{where}: levels: the sigma2 of a site is negative at every iso")
     return tuple(iso), np.array(k), np.array(sigma2)
 
 
@@ -223,10 +228,14 @@ def _matrices(data: dict[str, Any], where: str) -> np.ndarray:
         return published_matrices()
     try:
         matrices = np.asarray(data["xyz_to_camera"], dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         matrices = np.empty(0)
-    if matrices.ndim != 3 or matrices.shape[1:] != (3, 3) or not np.all(np.isfinite(matrices)):
+    if matrices.ndim != 3 or matrices.shape[1:] != (3, 3) or not len(matrices):
         raise FsidError(f"{where}: xyz_to_camera must be a list of 3x3 matrices of numbers")
+    if not is_of_camera(matrices):
+        raise FsidError(
+            f"{where}: xyz_to_camera: a matrix has no inverse, or sees no light where there is white"
+        )
     return matrices
 
 
@@ -250,7 +259,7 @@ def _integer(data: dict[str, Any], key: str, where: str, low: int, high: int) ->
 
 
 def _number(value: Any, where: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= _LARGEST:
         raise FsidError(f"{where} must be a number; got {value!r} (write 1.0e-05, YAML takes 1e-05 for text)")
     return float(value)
 
