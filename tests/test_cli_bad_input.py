@@ -44,6 +44,7 @@ CASES = [
     ("generate {0}/out --count 1 --width 33", "width"),
     ("generate {0}/out --count 1 --set no_such_key=1", "no_such_key"),
     ("generate {0}/out --count 1 --set cameras=[nokia]", "nokia"),
+    ("generate {0}/out --count 1 --set scene.rig.eyes=2", "scene.rig.eyes"),
     ("generate {0}/out --count 1 --set cameras=[nokia] scene.mesh_folders=[{0}/empty]", "nokia"),
     ("generate {0}/out --count 1 --set scene.mesh_folders=[{0}/chairs]", "chairs"),
     ("preview {0}/out.png --set cameras=[nokia] scene.mesh_folders=[{0}/empty]", "nokia"),

@@ -20,6 +20,7 @@ from fsid.dataset.pictures import find_pictures
 from fsid.dataset.sample import encode, make_frame
 from fsid.dataset.settle import Settle, settle
 from fsid.dataset.shards import remove_parts, shard_keys, shard_path, write_shard
+from fsid.dataset.tasks import check_cameras
 from fsid.dataset.worker import Worker
 from fsid.errors import FsidError
 from fsid.files import held
@@ -132,6 +133,7 @@ def dataset_config(config: GenerateConfig, seed: int, shard_size: int = 0) -> Da
     """The identity of the dataset of (config, seed); FsidError where what it names does not exist."""
     for camera in config.cameras:
         load_bayer_profile(camera)
+    check_cameras(config)
     scene = config.scene
     for folder in (*scene.mesh_folders, *scene.texture_folders, scene.hdri_folder):
         if not Path(folder).exists():

@@ -59,6 +59,16 @@ class Views:
     facts: dict[str, Any] = field(default_factory=dict)
 
 
+def check_cameras(config: GenerateConfig) -> None:
+    """FsidError where scenes have cameras that no task renders: every task sees through the first eye."""
+    eyes = config.scene.rig.eyes
+    if eyes > 1 and not config.images:
+        raise FsidError(
+            f"scene.rig.eyes: {eyes}, but --task {config.task} renders the first eye alone; "
+            "write such scenes with fsid scene and render each camera with fsid.render.Renderer"
+        )
+
+
 def scene_config(config: GenerateConfig) -> SceneConfig:
     """`config.scene` with the motion that the task needs, where it has none: a shutter time, or a burst."""
     scene, motion = config.scene, config.scene.motion
