@@ -185,9 +185,11 @@ def test_bad_renders_are_named(tmp_path: Path) -> None:
     write_exr(tmp_path / "nan.exr", light)
     with pytest.raises(FsidError, match=r"nan\.exr: holds NaN"):
         read_exr(tmp_path / "nan.exr")
-    (tmp_path / "broken.exr").write_bytes((tmp_path / "nan.exr").read_bytes()[:200])
-    with pytest.raises(FsidError, match=r"broken\.exr: cannot be read"):
-        read_exr(tmp_path / "broken.exr")
+    broken, whole = tmp_path / "broken.exr", (tmp_path / "nan.exr").read_bytes()
+    for size in (0, 200, len(whole) // 2):
+        broken.write_bytes(whole[:size])
+        with pytest.raises(FsidError, match=r"broken\.exr: cannot be read as OpenEXR, it is truncated"):
+            read_exr(broken)
     write_exr(tmp_path / "small.exr", np.ones((8, 64, 3), np.float32))
     with pytest.raises(FsidError, match=r"small\.exr: is 64x8"):
         read_exr(tmp_path / "small.exr")

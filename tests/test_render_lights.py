@@ -312,6 +312,7 @@ def test_the_sampler_gives_a_sky_to_open_air_alone() -> None:
         ("a.hdr", b"nothing", "no complete Radiance"),
         ("b.hdr", b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 16 +X 32\n" + bytes(99), "no complete Radiance"),
         ("c.hdr", b"#?RADIANCE\n\n-Y 16 +X 16\n" + bytes(16 * 16 * 4), "equirectangular"),
+        ("d.exr", b"\x76\x2f\x31\x01", r"d\.exr: is truncated"),
     ],
 )
 def test_a_broken_sky_is_named(tmp_path, name: str, content: bytes, message: str) -> None:

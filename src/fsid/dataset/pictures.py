@@ -61,8 +61,8 @@ def read_exr(path: Path) -> np.ndarray:
         with OpenEXR.File(str(path), separate_channels=True) as file:
             parts = [{name: c.pixels for name, c in part.channels.items()} for part in file.parts]
             chromaticities = file.header().get("chromaticities", _SRGB_CHROMATICITIES)
-    except (RuntimeError, ValueError, OSError) as error:
-        raise FsidError(f"{path}: cannot be read as OpenEXR ({error})") from None
+    except (RuntimeError, ValueError, OSError):
+        raise FsidError(f"{path}: cannot be read as OpenEXR, it is truncated or something else") from None
     colours = _light_of(path, parts)
     if not np.allclose(chromaticities, _SRGB_CHROMATICITIES, atol=2e-3):
         raise FsidError(f"{path}: its primaries are not those of sRGB (Rec. 709); convert it to linear sRGB")

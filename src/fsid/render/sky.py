@@ -123,8 +123,8 @@ def _read_exr(path: Path) -> np.ndarray:
         with OpenEXR.File(str(path)) as file:
             channels = file.channels()
             pixels = channels["RGB"].pixels if "RGB" in channels else channels["RGBA"].pixels[..., :3]
-    except (OSError, RuntimeError, KeyError, ValueError) as error:
-        raise FsidError(f"{path}: is no OpenEXR picture with R, G and B ({error})") from None
+    except (OSError, RuntimeError, KeyError, ValueError):
+        raise FsidError(f"{path}: is truncated, unreadable or no OpenEXR picture with R, G and B") from None
     return _equirectangular(np.asarray(pixels, np.float32), path)
 
 
