@@ -137,7 +137,7 @@ def test_a_shard_whose_record_is_none_is_named(data: Path, record: bytes, tmp_pa
     shutil.copy(data / "data" / "config.yaml", tmp_path)
     write_shard(shard_path(tmp_path, 0), [("00000001", {"json": record})])
     with pytest.raises(FsidError, match=r"shard-00000\.tar"):
-        make_only(tmp_path, "00000001", None, 0)
+        make_only(tmp_path, "00000001", None, None)
 
 
 @pytest.mark.parametrize(
