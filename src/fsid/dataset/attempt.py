@@ -7,6 +7,7 @@ Every draw has a random stream of its own, addressed by (frame, attempt, what is
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -210,6 +211,10 @@ class _Shot:
         if self.gains is None:
             return clean_from_photo(rng, image, self.profile)
         return clean_from_linear(rng, image * self.gains, self.profile)
+
+
+SAMPLE_KEY = re.compile(r"[0-9]{1,18}")
+"""What names a sample; Python turns no text of thousands of digits into a number."""
 
 
 def sample_key(index: int) -> str:

@@ -9,7 +9,6 @@ tar file. Indexing reads tar and TIFF headers only.
 from __future__ import annotations
 
 import hashlib
-import re
 import tarfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -19,6 +18,7 @@ from typing import Literal
 import tifffile
 
 from fsid.config import from_plain, read_yaml
+from fsid.dataset.attempt import SAMPLE_KEY
 from fsid.dataset.config import DatasetConfig, split_of
 from fsid.dataset.shards import find_shards
 from fsid.errors import FsidError
@@ -29,8 +29,6 @@ from fsid.sensor.raw import NoiseLevel
 
 _ORIGIN_KEYS = ("crops", "exposures", "noise_levels", "validation_every")
 """Settings that say which scene a sample is from; others may be those of another version of FSID."""
-
-_KEY = re.compile(r"[0-9]{1,18}")
 
 MosaicKind = Literal["clean", "noisy"]
 
@@ -95,19 +93,19 @@ def _origin(data_dir: Path) -> Callable[[StoredMosaic], tuple[int, str]]:
     """Scene and split of a sample by its key, from the config.yaml of the dataset, where there is one."""
     file = data_dir / "config.yaml"
     if not file.exists():
-        return lambda mosaic: (int(mosaic.key) if _KEY.fullmatch(mosaic.key) else 0, "train")
+        return lambda mosaic: (int(mosaic.key) if SAMPLE_KEY.fullmatch(mosaic.key) else 0, "train")
     plain = read_yaml(file)
     known = plain.get("generate", {})
     if isinstance(known, dict):
         known = {key: value for key, value in known.items() if key in _ORIGIN_KEYS}
-    identity = {"seed": 0, "shard_size": 1, "generate": known, "pictures": plain.get("pictures", 0)}
-    dataset = from_plain(DatasetConfig, identity, source=str(file))
+    settings = {"seed": 0, "shard_size": 1, "generate": known, "pictures": plain.get("pictures", 0)}
+    dataset = from_plain(DatasetConfig, settings, source=str(file))
     config, pictures = dataset.generate, dataset.pictures
     if pictures < 0:
         raise FsidError(f"{file}: pictures: {pictures} is negative")
 
     def origin(mosaic: StoredMosaic) -> tuple[int, str]:
-        if not _KEY.fullmatch(mosaic.key):
+        if not SAMPLE_KEY.fullmatch(mosaic.key):
             raise FsidError(
                 f"{mosaic.shard}: {mosaic.key!r} is no key that fsid generate gives, like 00000012"
             )

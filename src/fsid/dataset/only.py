@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from fsid.config import from_plain, read_yaml
-from fsid.dataset.attempt import Sample
+from fsid.dataset.attempt import SAMPLE_KEY, Sample
 from fsid.dataset.config import DatasetConfig, GenerateConfig
 from fsid.dataset.generate import dataset_config
 from fsid.dataset.sample import encode, make_sample, remake
@@ -14,8 +14,6 @@ from fsid.dataset.shards import read_record, read_records, shard_path
 from fsid.dataset.worker import rendering
 from fsid.errors import FsidError
 from fsid.files import write_atomically
-
-_KEY_DIGITS = 18  # at most; Python turns no text of thousands of digits into a number
 
 
 def make_only(out: Path, key: str, config: GenerateConfig | None, seed: int | None) -> list[Path]:
@@ -46,7 +44,7 @@ def _from_json(file: Path) -> Sample:
 
 
 def _from_key(out: Path, key: str, config: GenerateConfig | None, seed: int | None) -> Sample:
-    if not (key.isdecimal() and len(key) <= _KEY_DIGITS):
+    if not SAMPLE_KEY.fullmatch(key):
         raise FsidError(f"--only {key}: is neither the key of a sample, like 00000012, nor a .json file")
     index, file = int(key), out / "config.yaml"
     if file.exists():

@@ -24,9 +24,6 @@ _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3
 _LARGE_BYTES, _KEPT_BYTES = 2**20, 2**26
 _MAX_DEVICES = 16
 _SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swiftshader")
-os.environ.setdefault("GALLIVM_PERF", "no_aos_sampling")
-"""llvmpipe filters textures of 8 bits in 8 bits, in steps as large as read noise, unless it is told not to.
-It looks at this when the first context is made."""
 _HELP = (
     "install the Debian packages libegl1 libgl1 libgl1-mesa-dri for software rendering; in an NVIDIA "
     "container set NVIDIA_DRIVER_CAPABILITIES=graphics (or all) for the GPU"
@@ -134,6 +131,9 @@ def return_free_blocks() -> None:
 def _create(device_index: int) -> moderngl.Context:
     settings: Any = {"backend": "egl", "libgl": "libGL.so.1", "libegl": "libEGL.so.1"}
     settings["device_index"] = device_index
+    # llvmpipe filters textures of 8 bits in 8 bits, in steps as large as read noise, unless it is told not
+    # to before the process's first context.
+    os.environ.setdefault("GALLIVM_PERF", "no_aos_sampling")
     try:
         return moderngl.create_context(require=REQUIRED_VERSION, standalone=True, **settings)
     except Exception as error:  # the EGL backend raises bare Exception

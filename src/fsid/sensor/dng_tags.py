@@ -18,7 +18,19 @@ import numpy as np
 
 from fsid.sensor.metadata import COLOUR_MATRICES, DATE_TAKEN, EXPOSURE_TIME, ORIENTATION, merged
 from fsid.sensor.raw import NoiseLevel, Raw
-from fsid.sensor.tiff import ASCII, BYTE, DOUBLE, LONG, RATIONAL, SHORT, SRATIONAL, Tag, Values, rationals
+from fsid.sensor.tiff import (
+    ASCII,
+    BYTE,
+    DOUBLE,
+    LONG,
+    RATIONAL,
+    SHORT,
+    SRATIONAL,
+    Tag,
+    Values,
+    quotients,
+    rationals,
+)
 
 Tags = dict[int, Values]
 
@@ -121,8 +133,7 @@ def iso_speed(tags: Tags) -> float:
 
 def exposure_time_s(tags: Tags) -> float:
     """Exposure time in seconds; 0 where `tags` state none."""
-    values = _numbers(tags, EXPOSURE_TIME)
-    return values[0] / values[1] if len(values) == 2 and values[1] else 0.0
+    return next(iter(quotients(_numbers(tags, EXPOSURE_TIME))), 0.0)
 
 
 def date_taken(tags: Tags) -> str:
@@ -134,14 +145,14 @@ def date_taken(tags: Tags) -> str:
 def black_tile(tags: Tags) -> np.ndarray | None:
     """(rows, columns) black levels in DN that repeat from the image's first pixel on; None where `tags` are
     not a DNG's, or state none that fit their pattern."""
-    values = np.array(_numbers(tags, BLACK_LEVEL), np.float64)
+    values = list(_numbers(tags, BLACK_LEVEL))
     repeat = _numbers(tags, BLACK_REPEAT) or (1, 1)
     if DNG_VERSION not in tags or len(repeat) != 2 or not all(1 <= n <= MAX_REPEAT for n in repeat):
         return None
     rows, columns = int(repeat[0]), int(repeat[1])
-    if len(values) == 2 * rows * columns and np.all(values[1::2] > 0):
-        values = values[::2] / values[1::2]
-    return values.reshape(rows, columns) if len(values) == rows * columns else None
+    if len(values) == 2 * rows * columns:
+        values = quotients(values)
+    return np.array(values, np.float64).reshape(rows, columns) if len(values) == rows * columns else None
 
 
 def d65_matrix(tags: Tags) -> np.ndarray | None:
@@ -149,8 +160,8 @@ def d65_matrix(tags: Tags) -> np.ndarray | None:
     first = (_number(tags, ILLUMINANT_1, D65), _numbers(tags, COLOUR_MATRIX_1))
     second = (_number(tags, ILLUMINANT_2, 0), _numbers(tags, COLOUR_MATRIX_2))
     for _, numbers in sorted((first, second), key=lambda pair: pair[0] != D65):
-        if len(numbers) == 18 and all(numbers[1::2]):
-            return np.array([n / d for n, d in zip(numbers[::2], numbers[1::2], strict=True)]).reshape(3, 3)
+        if len(matrix := quotients(numbers)) == 9:
+            return np.reshape(matrix, (3, 3))
     return None
 
 

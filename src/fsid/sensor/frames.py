@@ -117,16 +117,21 @@ def _files(paths: Sequence[Path]) -> list[Path]:
     for path in paths:
         if not path.exists():
             raise FsidError(f"{path}: no such frame")
-        inside = sorted(p for p in path.rglob("*") if p.is_file() and not _hidden(p, path))
-        if path.is_dir() and not inside:
+        found = _inside(path) if path.is_dir() else [path]
+        if not found:
             raise FsidError(f"{path}: holds no frames")
-        for file in inside if path.is_dir() else [path]:
+        for file in found:
             files.setdefault(file.resolve(), file)
     return list(files.values())
 
 
-def _hidden(path: Path, root: Path) -> bool:
-    return any(part.startswith(".") for part in path.relative_to(root).parts)
+def _inside(folder: Path) -> list[Path]:
+    """The files of a folder and of its folders, hidden ones left out."""
+
+    def hidden(path: Path) -> bool:
+        return any(part.startswith(".") for part in path.relative_to(folder).parts)
+
+    return sorted(path for path in folder.rglob("*") if path.is_file() and not hidden(path))
 
 
 def _raw_frames(paths: Sequence[Path], dark: Sequence[Path], layout: Layout) -> FrameSet:

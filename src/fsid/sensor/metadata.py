@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from fsid.sensor.tiff import ASCII, RATIONAL, SHORT, Tag, rationals
+from fsid.sensor.tiff import ASCII, RATIONAL, SHORT, Tag, quotients, rationals
 
 ORIENTATION, EXPOSURE_TIME, F_NUMBER, FOCAL_LENGTH, LENS_MODEL = 274, 33434, 33437, 37386, 42036
 DATE_TAKEN = 36867
@@ -72,10 +72,7 @@ def _numbers(tag: Tag) -> list[float]:
     """The values of `tag`, rationals divided out; [] of text and of rationals that are no numbers."""
     if isinstance(tag.values, bytes):
         return []
-    if tag.kind != RATIONAL:
-        return [float(value) for value in tag.values]
-    pairs = list(zip(tag.values[::2], tag.values[1::2], strict=True))
-    return [n / d for n, d in pairs] if all(d for _, d in pairs) else []
+    return quotients(tag.values) if tag.kind == RATIONAL else [float(value) for value in tag.values]
 
 
 def kept_metadata(directories: Sequence[Mapping[int, Tag]], mosaic: Mapping[int, Tag]) -> Metadata:

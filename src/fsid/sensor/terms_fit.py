@@ -84,7 +84,7 @@ def fit_terms(
     dark: Sequence[DarkFinding], prnu: Sequence[float], k_dn_at_iso: dict[float, float]
 ) -> NoiseTerms:
     """The mean of what the bursts of all ISOs show, the shortest dark one of each."""
-    shortest = [found for iso in {found.iso for found in dark} if (found := shortest_dark(dark, iso))]
+    shortest = [found for found in dark if found is shortest_dark(dark, found.iso)]
 
     def mean(name: str) -> float:
         return _rounded(float(np.mean([getattr(f.terms, name) for f in shortest]))) if shortest else 0.0

@@ -10,7 +10,7 @@ because a broken file must cost neither time nor memory: a tag that reaches outs
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import BinaryIO
@@ -134,6 +134,14 @@ def rationals(values: Iterable[float]) -> tuple[int, ...]:
     """Numerators and denominators in turn; numbers return within 1e-11 of themselves."""
     fractions = [Fraction(float(value)).limit_denominator(_DENOMINATOR) for value in values]
     return tuple(n for f in fractions for n in (f.numerator, f.denominator))
+
+
+def quotients(values: Sequence[float]) -> list[float]:
+    """The numbers of numerators and denominators in turn; [] where one is over 0 or has no denominator."""
+    numerators, denominators = values[::2], values[1::2]
+    if len(numerators) != len(denominators) or not all(denominators):
+        return []
+    return [n / d for n, d in zip(numerators, denominators, strict=True)]
 
 
 # TIFF, and what Panasonic and Olympus write in the place of its 42.

@@ -41,7 +41,7 @@ def surroundings(mi: Any, scene: Scene) -> dict[str, Any]:
     if scene.sky is not None:
         matrix = np.eye(4)
         matrix[:3, :3] = np.stack([(0, 1, 0), (0, 0, 1), (-1, 0, 0)], axis=-1)  # its y is up, its -z is our x
-        picture = mi.Bitmap(panorama(scene.sky).copy())
+        picture = mi.Bitmap(panorama(scene.sky).copy())  # Mitsuba takes no array that cannot be written
         return {"sky": {"type": "envmap", "bitmap": picture, "to_world": mi.ScalarTransform4f(matrix)}}
     if any(scene.ambient):
         return {"sky": {"type": "constant", "radiance": _rgb(np.array(scene.ambient))}}

@@ -82,7 +82,7 @@ Matter matter_at(Surface s, vec3 position, vec3 normal, vec3 dx, vec3 dy) {
     vec3 gradient = vec3(0);
     float total = 0.0, texels = float(textureSize(masks, 0).x);
     do {
-        int axis = max(findLSB(left), 0);
+        int axis = findLSB(left);
         left &= left - 1u;
         vec3 u, v;
         face_axes(axis, n[axis] < 0.0 ? -1.0 : 1.0, u, v);
