@@ -220,6 +220,22 @@ def test_the_cache_changes_nothing_and_follows_the_file(tmp_path: Path, own_cach
     assert np.ptp(load_source(f"file:{file}").vertices, axis=0).max() == pytest.approx(0.3)
 
 
+@pytest.mark.parametrize(("field", "value"), [(10, 77), (8, 1), (None, 0xFF)])
+def test_a_damaged_mesh_in_the_cache_is_made_again(tmp_path: Path, own_cache: Path, field, value: int):
+    file = tmp_path / "model.obj"
+    file.write_text(cube_obj())
+    fresh = load_source(f"file:{file}")
+    (stored,) = own_cache.rglob("*.npz")
+    data = bytearray(stored.read_bytes())
+    if field is None:
+        start = 30 + len("vertices.npy") + 20  # past the header of the first member
+        data[start : start + 20] = bytes([value] * 20)
+    else:
+        data[data.index(b"PK\1\2") + field] = value  # method and flags in the directory
+    stored.write_bytes(data)
+    np.testing.assert_array_equal(load_source(f"file:{file}").vertices, fresh.vertices)
+
+
 def test_the_seed_plays_no_part(tmp_path: Path):
     (tmp_path / "cube.obj").write_text(cube_obj())
     (name,) = mesh_sources(tmp_path)

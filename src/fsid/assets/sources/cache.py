@@ -15,6 +15,7 @@ import hashlib
 import io
 import os
 import zipfile
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -62,7 +63,7 @@ def _load(key: str, names: tuple[str, ...]) -> list[np.ndarray] | None:
     try:
         with np.load(folder / f"{key}.npz", allow_pickle=False) as stored:
             return [stored[name] for name in names]
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+    except (OSError, ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile, zlib.error):
         pass
     try:
         reason = (folder / f"{key}.txt").read_text(encoding="utf-8")
