@@ -236,6 +236,40 @@ def test_a_damaged_mesh_in_the_cache_is_made_again(tmp_path: Path, own_cache: Pa
     np.testing.assert_array_equal(load_source(f"file:{file}").vertices, fresh.vertices)
 
 
+def test_a_gltf_is_read_again_when_its_buffer_comes_or_changes(tmp_path: Path):
+    trimesh.creation.box((1.0, 2.0, 3.0)).export(tmp_path / "model.gltf")
+    name, buffer = f"file:{tmp_path}/model.gltf", sorted(tmp_path.glob("*.bin"))[0]
+    renamed = tmp_path / "größe #1.bin"
+    text = (tmp_path / "model.gltf").read_text()
+    (tmp_path / "model.gltf").write_text(text.replace(buffer.name, "gr%C3%B6%C3%9Fe%20%231.bin"))
+    data = buffer.read_bytes()
+    buffer.unlink()
+    with pytest.raises(FsidError, match=r"'größe #1\.bin' is missing"):
+        load_source(name)
+    renamed.write_bytes(data[:20])
+    with pytest.raises(FsidError, match="cannot be read"):
+        load_source(name)
+    renamed.write_bytes(data)
+    np.testing.assert_allclose(np.ptp(load_source(name).vertices, axis=0), (1, 3, 2))
+
+
+def test_a_refusal_that_may_pass_is_not_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    (tmp_path / "cube.obj").write_text(cube_obj())
+
+    opened = Path.open
+
+    def denied(path: Path, *arguments, **options):
+        if path.suffix == ".obj":
+            raise PermissionError(13, "Permission denied")
+        return opened(path, *arguments, **options)
+
+    with monkeypatch.context() as context:
+        context.setattr(Path, "open", denied)
+        with pytest.raises(FsidError, match="Permission denied"):
+            load_source(f"file:{tmp_path}/cube.obj")
+    assert len(load_source(f"file:{tmp_path}/cube.obj").faces) == 12
+
+
 def test_the_seed_plays_no_part(tmp_path: Path):
     (tmp_path / "cube.obj").write_text(cube_obj())
     (name,) = mesh_sources(tmp_path)

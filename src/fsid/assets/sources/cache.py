@@ -1,8 +1,8 @@
 """Cleaned meshes on disk, so that a library is read once per machine and not once per process.
 
-A mesh is (key).npz, a refusal (key).txt with its reason. The key covers the file's place, size and time and
-the version of the cleaning. Deleting the folder costs time and nothing else; a folder that cannot be
-written only makes the next process slower.
+A mesh is (key).npz, a refusal (key).txt with its reason. The key covers the file's place, size and time,
+those of the files that it refers to, and the version of the cleaning. Deleting the folder costs time and
+nothing else; a folder that cannot be written only makes the next process slower.
 
 The folder is $FSID_CACHE/meshes, or $XDG_CACHE_HOME/fsid/meshes, or ~/.cache/fsid/meshes; FSID_CACHE=off
 keeps no files.
@@ -16,6 +16,7 @@ import io
 import os
 import zipfile
 import zlib
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -28,11 +29,23 @@ _VERSION = 2
 """One more whenever the same file gives another mesh."""
 
 
-def cache_key(path: Path, member: str) -> str:
-    """Name of what is made from a file as it is now. OSError where there is none."""
-    state = path.stat()
-    text = f"{_VERSION}|{path.resolve()}|{state.st_size}|{state.st_mtime_ns}|{member}"
+def cache_key(path: Path, member: str, referred: Sequence[Path] = ()) -> str:
+    """Name of what is made from a file, and from those that it refers to, as they are now. OSError where
+    there is none; the others may be missing."""
+    text = "|".join((f"{_VERSION}|{path.resolve()}|{_state(path)}|{member}", *map(_state_if_any, referred)))
     return hashlib.blake2b(text.encode(), digest_size=20).hexdigest()
+
+
+def _state(path: Path) -> str:
+    state = path.stat()
+    return f"{state.st_size}|{state.st_mtime_ns}"
+
+
+def _state_if_any(path: Path) -> str:
+    try:
+        return _state(path)
+    except (OSError, ValueError):
+        return "missing"
 
 
 def load_mesh(key: str) -> Mesh | None:

@@ -22,6 +22,7 @@ from fsid.assets.sources.limits import (
     MAX_CATALOGUE_BYTES,
     MAX_DIRECTORY_BYTES,
     MAX_FILE_BYTES,
+    NotNowError,
     RefusedError,
 )
 
@@ -68,7 +69,9 @@ def open_archive(path: Path) -> zipfile.ZipFile:
     try:
         _check_directory(path)
         return zipfile.ZipFile(path)
-    except (OSError, zipfile.BadZipFile, ValueError, NotImplementedError) as error:
+    except OSError as error:
+        raise NotNowError(f"cannot be opened ({error.strerror})") from None
+    except (zipfile.BadZipFile, ValueError, NotImplementedError) as error:
         raise RefusedError(f"not a readable zip archive ({error})") from None
 
 

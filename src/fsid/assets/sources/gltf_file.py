@@ -10,6 +10,7 @@ from __future__ import annotations
 import base64
 import binascii
 import json
+import re
 import struct
 from collections.abc import Callable
 from typing import Any
@@ -23,6 +24,7 @@ _KEPT = ("asset", "scene", "scenes", "nodes", "meshes", "accessors", "bufferView
 _JSON, _BIN = 0x4E4F534A, 0x004E4942
 _PACKED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression")
 _TRIANGLE_MODES = (4, 5)
+_URI = re.compile(rb'"uri"\s*:\s*("(?!data:)(?:[^"\\]|\\.){1,1000}")')
 
 
 def plain_gltf(data: bytes, fetch: Fetch) -> tuple[bytes, dict[str, bytes]]:
@@ -41,6 +43,11 @@ def plain_gltf(data: bytes, fetch: Fetch) -> tuple[bytes, dict[str, bytes]]:
     plain["buffers"] = [{"uri": name, "byteLength": len(content)} for name, content in buffers.items()]
     plain["meshes"] = [_named_mesh(mesh, document.get("materials", [])) for mesh in document["meshes"]]
     return json.dumps(plain).encode(), buffers
+
+
+def referred(data: bytes) -> list[str]:
+    """What a .gltf refers to, as far as that is seen without reading it: every "uri" that is no data."""
+    return [json.loads(name, strict=False) for name in _URI.findall(data)[:MAX_NODES]]
 
 
 def _split(data: bytes) -> tuple[dict[str, Any], bytes | None]:

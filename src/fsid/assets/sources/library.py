@@ -32,7 +32,8 @@ from fsid.assets.sources.cache import (
 )
 from fsid.assets.sources.catalogue import Entry, read_catalogue, read_member
 from fsid.assets.sources.cleaning import Triangles, clean
-from fsid.assets.sources.limits import MAX_FILE_BYTES, RefusedError
+from fsid.assets.sources.gltf_file import referred
+from fsid.assets.sources.limits import MAX_FILE_BYTES, NotNowError, RefusedError
 from fsid.assets.sources.reading import MESH_SUFFIXES, read_triangles
 from fsid.errors import FsidError
 
@@ -119,8 +120,10 @@ def _measures(name: str) -> np.ndarray:
 
 
 def _key(path: Path, member: str) -> str:
+    is_gltf = path.suffix.lower() == ".gltf" and not member
     try:
-        return cache_key(path, member)
+        names = referred(_bounded(path)) if is_gltf else []
+        return cache_key(path, member, [path.parent / unquote(name) for name in names])
     except (OSError, ValueError) as error:
         raise RefusedError(f"cannot be opened ({error})") from None
 
@@ -133,6 +136,8 @@ def _mesh(name: str) -> Mesh:
     if mesh is None:
         try:
             mesh = _from_library(path, member) if member else _from_file(path)
+        except NotNowError:
+            raise
         except RefusedError as error:
             store_refusal(key, str(error))
             raise
@@ -239,7 +244,7 @@ def _bounded(path: Path) -> bytes:
         with path.open("rb") as file:
             data = file.read(MAX_FILE_BYTES + 1)
     except OSError as error:
-        raise RefusedError(f"cannot be opened ({error.strerror})") from None
+        raise NotNowError(f"cannot be opened ({error.strerror})") from None
     if len(data) > MAX_FILE_BYTES:
         raise RefusedError(f"larger than {MAX_FILE_BYTES >> 20} MiB")
     return data

@@ -28,3 +28,7 @@ MAX_DEPTH = 200
 
 class RefusedError(Exception):
     """Why a mesh is not used: a short clause without the file's name, which the caller knows."""
+
+
+class NotNowError(RefusedError):
+    """A refusal for no fault of the content (no permission, no memory): another time it may be read."""

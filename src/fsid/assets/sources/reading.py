@@ -9,7 +9,7 @@ import numpy as np
 
 from fsid.assets.sources.cleaning import Triangles
 from fsid.assets.sources.gltf_file import Fetch, plain_gltf
-from fsid.assets.sources.limits import MAX_FILE_BYTES, MAX_PARTS, MAX_TRIANGLES, RefusedError
+from fsid.assets.sources.limits import MAX_FILE_BYTES, MAX_PARTS, MAX_TRIANGLES, NotNowError, RefusedError
 
 MESH_SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl")
 
@@ -29,6 +29,8 @@ def read_triangles(data: bytes, suffix: str, fetch: Fetch) -> Triangles:
         triangles = _joined(_geometries(data, suffix, fetch))
     except (RefusedError, KeyboardInterrupt):
         raise
+    except (ImportError, MemoryError) as error:
+        raise NotNowError(f"cannot be read here ({type(error).__name__}: {_one_line(error)})") from None
     except Exception as error:  # what a reader of foreign formats may raise has no end
         raise RefusedError(f"cannot be read ({type(error).__name__}: {_one_line(error)})") from None
     if suffix in _Y_UP:
