@@ -180,6 +180,18 @@ def test_a_folder_with_one_set_is_a_name_too(folder):
     np.testing.assert_array_equal(by_folder.height, by_prefix.height)
 
 
+def test_a_set_beside_a_folder_of_its_name_is_not_taken_for_the_folder(folder):
+    for name in ("wood", "cork"):
+        save(folder / "mixed_1k" / f"{name}_diff_1k.png", picture(4))
+    save(folder / "mixed_diff_1k.png", picture(5))
+    save(folder / "rock_wall_Color.png", picture(6))
+    for name, seed in (("mixed_1k", 5), ("rock_wall", 6)):
+        assert f"file:{folder / name}" in texture_sources(folder)
+        maps = bake_material(f"file:{folder / name}", 0, SIZE)
+        shown = decode(maps.mix, maps.pattern, maps.detail, maps.colours)
+        np.testing.assert_allclose(shown, srgb_to_linear(picture(seed) / 255), atol=0.02)
+
+
 def test_a_layer_lies_over_a_texture_set(folder):
     name = texture_sources(folder)[0]
     bare, dusty = bake_material(name, 0, 64), bake_material(f"{name}+dust", 0, 64)

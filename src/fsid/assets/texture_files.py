@@ -78,15 +78,15 @@ def sets_below(path: Path, deep: bool = True) -> list[TextureSet]:
 
 
 def set_at(path: Path) -> TextureSet:
-    """The set named by `path`: its common name, or a folder that holds just one. RefusedImageError."""
+    """The set named by `path`: its common name, else a folder that holds just one. RefusedImageError."""
+    for candidate in sets_below(path.parent, deep=False) if path.parent.is_dir() else []:
+        if candidate.path == path:
+            return candidate
     if path.is_dir():
         found = sets_below(path)
         if len(found) != 1:
             raise RefusedImageError(f"the folder holds {len(found)} texture sets; name one")
         return found[0]
-    for candidate in sets_below(path.parent, deep=False) if path.parent.is_dir() else []:
-        if candidate.path == path:
-            return candidate
     raise RefusedImageError("no texture set (ambientCG or Poly Haven file names) has this name")
 
 
