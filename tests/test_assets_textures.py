@@ -122,6 +122,17 @@ def test_maps_of_data_may_be_openexr_as_in_the_archives_of_poly_haven(tmp_path):
     assert exr.relief_m == pytest.approx(png.relief_m, rel=0.02)
 
 
+def test_the_alpha_of_a_grey_exr_is_not_its_map(tmp_path):
+    import OpenEXR
+
+    grey = np.full((SIZE, SIZE), 0.25, np.float32)
+    save(tmp_path / "rock_diff_1k.jpg", picture())
+    channels = {"A": np.ones_like(grey), "Y": grey}
+    with OpenEXR.File({"type": OpenEXR.scanlineimage}, channels) as file:
+        file.write(str(tmp_path / "rock_rough_1k.exr"))
+    np.testing.assert_allclose(bake_material(f"file:{tmp_path}", 0, 64).roughness, 0.25, atol=0.01)
+
+
 def test_an_exr_that_is_no_map_is_left_out(tmp_path, monkeypatch):
     monkeypatch.setattr(files, "MAX_PIXELS", SIZE * SIZE)
     grey = np.full((SIZE, SIZE), 0.5)

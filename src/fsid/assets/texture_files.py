@@ -110,8 +110,8 @@ def decode_file(path: Path, data: bytes, size: int) -> np.ndarray:
 
 
 def decode_exr(path: Path) -> np.ndarray:
-    """(H, W, C) float32 of R, G and B (C 3) or of the first channel (C 1), as stored: a displacement may be
-    in any unit. Raises RefusedImageError that names the file.
+    """(H, W, C) float32 of R, G and B (C 3) or of the first channel but alpha (C 1), as stored: a
+    displacement may be in any unit. Raises RefusedImageError that names the file.
     """
     import OpenEXR  # only users of such files need it
 
@@ -122,7 +122,8 @@ def decode_exr(path: Path) -> np.ndarray:
         _check_size(path.name, width, height)
         with OpenEXR.File(str(path), separate_channels=True) as file:
             channels = {name: channel.pixels for name, channel in file.channels().items()}
-        names = ("R", "G", "B") if {"R", "G", "B"} <= set(channels) else sorted(channels)[:1]
+        grey = sorted(channels, key=lambda name: (name.rpartition(".")[2] == "A", name))[:1]
+        names = ("R", "G", "B") if {"R", "G", "B"} <= set(channels) else grey
         pixels = np.stack([np.asarray(channels[name], np.float32) for name in names], axis=-1)
     except (OSError, RuntimeError, ValueError, KeyError, TypeError, MemoryError) as error:
         raise RefusedImageError(f"{path.name} is no readable OpenEXR picture ({error})") from None
