@@ -10,6 +10,7 @@ import pytest
 from PIL import Image
 
 from fsid.cli.main import main
+from fsid.dataset import find_photos, find_pictures
 from fsid.dataset.inspect import inspect
 from fsid.dataset.shards import shard_path, write_shard
 from fsid.dataset.statistics import TITLES, compare, distance, measure, pool, spectrum_slope
@@ -149,6 +150,13 @@ def test_a_photograph_may_have_a_name_that_is_no_text(photos, tmp_path):
         shutil.copy(photos / "0.png", tmp_path / name)
     except OSError:
         pytest.skip("this file system takes names in UTF-8 alone")
+    assert inspect(tmp_path).pictures == 1
+
+
+def test_hidden_files_are_no_photographs(photos, tmp_path):
+    shutil.copy(photos / "0.png", tmp_path)
+    (tmp_path / "._0.png").write_bytes(b"\0\5\x16\7Mac OS X")
+    assert find_photos(tmp_path) == find_pictures(tmp_path) == [tmp_path / "0.png"]
     assert inspect(tmp_path).pictures == 1
 
 

@@ -16,10 +16,16 @@ def find_photos(folder: Path) -> list[Path]:
     """The photographs directly inside `folder`, sorted by name; FsidError where there is none."""
     if not folder.is_dir():
         raise FsidError(f"{folder}: is not a folder of photographs")
-    photos = sorted(path for path in folder.iterdir() if path.suffix.lower() in PHOTO_SUFFIXES)
+    photos = files_inside(folder, PHOTO_SUFFIXES)
     if not photos:
         raise FsidError(f"{folder}: holds no photograph ({', '.join(PHOTO_SUFFIXES)})")
     return photos
+
+
+def files_inside(folder: Path, suffixes: tuple[str, ...]) -> list[Path]:
+    """The files directly inside `folder` that end so, sorted; hidden ones ("._a.jpg" of macOS) left out."""
+    files = (path for path in folder.iterdir() if not path.name.startswith("."))
+    return sorted(path for path in files if path.suffix.lower() in suffixes)
 
 
 def read_photo(path: Path) -> np.ndarray:

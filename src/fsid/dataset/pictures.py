@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fsid.dataset.photos import PHOTO_SUFFIXES, read_photo
+from fsid.dataset.photos import PHOTO_SUFFIXES, files_inside, read_photo
 from fsid.errors import FsidError
 
 EXR_SUFFIX = ".exr"
@@ -35,7 +35,7 @@ def find_pictures(folder: Path) -> list[Path]:
     if not folder.is_dir():
         raise FsidError(f"{folder}: is not a folder of photographs or .exr renders")
     suffixes = (*PHOTO_SUFFIXES, EXR_SUFFIX)
-    pictures = sorted(path for path in folder.iterdir() if path.suffix.lower() in suffixes)
+    pictures = files_inside(folder, suffixes)
     if not pictures:
         raise FsidError(f"{folder}: holds no picture ({', '.join(suffixes)})")
     return pictures
