@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import io
+import struct
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import tifffile
-from PIL import Image
+from PIL import ExifTags, Image, ImageOps
 from scipy.ndimage import gaussian_filter, map_coordinates
 
 from fsid.config import load_settings
@@ -193,6 +194,23 @@ def test_bad_renders_are_named(tmp_path: Path) -> None:
     write_exr(tmp_path / "small.exr", np.ones((8, 64, 3), np.float32))
     with pytest.raises(FsidError, match=r"small\.exr: is 64x8"):
         read_exr(tmp_path / "small.exr")
+
+
+@pytest.mark.parametrize("orientation", range(1, 9))
+def test_a_photograph_stands_upright_whatever_else_its_exif_says(orientation: int, tmp_path: Path) -> None:
+    image = Image.fromarray(np.arange(40 * 48 * 3, dtype=np.uint8).reshape(40, 48, 3))
+    exif = Image.Exif()
+    exif[ExifTags.Base.Orientation] = orientation
+    exif[ExifTags.Base.Make] = "a camera"
+    data = exif.tobytes()
+    order = ">" if b"MM" in data[:8] else "<"
+    text, ratio = (struct.pack(f"{order}HHI", ExifTags.Base.Make, *kind) for kind in ((2, 9), (5, 1)))
+    assert text in data
+    image.save(tmp_path / "sound.png", exif=data)
+    image.save(tmp_path / "faulty.png", exif=data.replace(text, ratio))
+    expected = np.asarray(ImageOps.exif_transpose(Image.open(tmp_path / "sound.png")))
+    for name in ("sound.png", "faulty.png"):
+        np.testing.assert_array_equal(np.rint(read_photo(tmp_path / name) * 255), expected)
 
 
 @pytest.mark.parametrize("name", ["grey.png", "grey.tif", "big-endian.tif", "turned.png"])

@@ -2,14 +2,28 @@
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 
 import numpy as np
-from PIL import Image, ImageOps
+from PIL import ExifTags, Image
 
 from fsid.errors import FsidError
 
 PHOTO_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".bmp")
+
+
+_TURN = Image.Transpose
+_UPRIGHT = {
+    2: _TURN.FLIP_LEFT_RIGHT,
+    3: _TURN.ROTATE_180,
+    4: _TURN.FLIP_TOP_BOTTOM,
+    5: _TURN.TRANSPOSE,
+    6: _TURN.ROTATE_270,
+    7: _TURN.TRANSVERSE,
+    8: _TURN.ROTATE_90,
+}
+"""By EXIF's orientation. Pillow's `exif_transpose` writes all of EXIF anew; a faulty tag makes that fail."""
 
 
 def find_photos(folder: Path) -> list[Path]:
@@ -33,7 +47,7 @@ def read_photo(path: Path) -> np.ndarray:
     try:
         with Image.open(path) as image:
             pixels = _decoded(image)
-    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+    except (OSError, SyntaxError, ValueError, struct.error, Image.DecompressionBombError) as error:
         raise FsidError(f"{path}: cannot be read as a photograph ({error})") from None
     height, width = (size // 2 * 2 for size in pixels.shape[:2])
     if min(height, width) < 32:
@@ -43,7 +57,8 @@ def read_photo(path: Path) -> np.ndarray:
 
 def _decoded(image: Image.Image) -> np.ndarray:
     """(H, W, 3) float32 0..1, upright; Pillow's own conversion of 16-bit grey would clip it to white."""
-    upright = ImageOps.exif_transpose(image)
+    turn = _UPRIGHT.get(image.getexif().get(ExifTags.Base.Orientation, 1))
+    upright = image if turn is None else image.transpose(turn)
     if image.mode.startswith("I;16") or (image.mode, image.format) == ("I", "PNG"):
         grey = np.asarray(upright, np.float32) / np.float32(65535.0)
         return grey[..., None].repeat(3, axis=2)
