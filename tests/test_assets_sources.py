@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import zipfile
 from pathlib import Path
 
@@ -218,6 +219,37 @@ def test_the_cache_changes_nothing_and_follows_the_file(tmp_path: Path, own_cach
     np.testing.assert_array_equal(load_source(f"file:{file}").vertices, fresh.vertices)
     file.write_text(cube_obj(unit=0.1))
     assert np.ptp(load_source(f"file:{file}").vertices, axis=0).max() == pytest.approx(0.3)
+
+
+@pytest.mark.parametrize(("kind", "code"), [("<i2", 5122), ("u1", 5121)])
+def test_positions_of_normalised_integers_are_fractions(tmp_path: Path, kind: str, code: int):
+    cube = trimesh.creation.box((2.0, 2.0, 2.0))
+    steps = np.zeros((8, 4), kind)
+    steps[:, :3] = cube.vertices.clip(min=np.sign(np.iinfo(kind).min)) * np.iinfo(kind).max
+    data = steps.tobytes() + cube.faces.astype("<u2").tobytes()
+    document = {
+        "asset": {"version": "2.0"},
+        "extensionsRequired": ["KHR_mesh_quantization"],
+        "scene": 0,
+        "scenes": [{"nodes": [0, 1]}],
+        "nodes": [{"mesh": 0, "scale": [0.5, 1.0, 1.5]}, {"mesh": 0, "translation": [0.0, 3.0, 0.0]}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "accessors": [
+            {"bufferView": 0, "componentType": code, "normalized": True, "count": 8, "type": "VEC3"},
+            {"bufferView": 1, "componentType": 5123, "count": 36, "type": "SCALAR"},
+        ],
+        "bufferViews": [
+            {"buffer": 0, "byteLength": steps.nbytes, "byteStride": 4 * steps.itemsize},
+            {"buffer": 0, "byteOffset": steps.nbytes, "byteLength": 72},
+        ],
+        "buffers": [{"byteLength": len(data), "uri": "data.bin"}],
+    }
+    (tmp_path / "data.bin").write_bytes(data)
+    (tmp_path / "cubes.gltf").write_text(json.dumps(document))
+    low = 0 if kind == "u1" else -1
+    mesh = load_source(f"file:{tmp_path}/cubes.gltf")
+    expected = (1 - low, 1.5 * (1 - low), 4 - low)
+    np.testing.assert_allclose(np.ptp(mesh.vertices, axis=0), expected, rtol=1e-4)
 
 
 @pytest.mark.parametrize(("field", "value"), [(10, 77), (8, 1), (None, 0xFF)])

@@ -15,6 +15,8 @@ import struct
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from fsid.assets.sources.limits import MAX_DEPTH, MAX_FILE_BYTES, MAX_NODES, MAX_TRIANGLES, RefusedError
 
 Fetch = Callable[[str], bytes]
@@ -24,6 +26,7 @@ _KEPT = ("asset", "scene", "scenes", "nodes", "meshes", "accessors", "bufferView
 _JSON, _BIN = 0x4E4F534A, 0x004E4942
 _PACKED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression")
 _TRIANGLE_MODES = (4, 5)
+_NORMALISED = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2"}
 _URI = re.compile(rb'"uri"\s*:\s*("(?!data:)(?:[^"\\]|\\.){1,1000}")')
 
 
@@ -39,6 +42,7 @@ def plain_gltf(data: bytes, fetch: Fetch) -> tuple[bytes, dict[str, bytes]]:
     buffers = _buffers(document, binary, fetch)
     _check_counts(document)
     _check_graph(document)
+    _float_positions(document, buffers)
     plain = {key: document[key] for key in _KEPT if key in document}
     plain["buffers"] = [{"uri": name, "byteLength": len(content)} for name, content in buffers.items()]
     plain["meshes"] = [_named_mesh(mesh, document.get("materials", [])) for mesh in document["meshes"]]
@@ -115,6 +119,26 @@ def _check_graph(document: dict[str, Any]) -> None:
             )
     if reached != len(nodes):
         raise RefusedError("nodes in a circle")
+
+
+def _float_positions(document: dict[str, Any], buffers: dict[str, bytes]) -> None:
+    """Positions that are normalised integers (KHR_mesh_quantization) as the floats that they stand for, each
+    accessor in a buffer of its own: the reader takes integers as they are."""
+    used = {p["attributes"]["POSITION"] for mesh in document["meshes"] for p in mesh["primitives"]}
+    found = [document["accessors"][i] for i in sorted(used)]
+    found = [accessor for accessor in found if accessor.get("normalized")]
+    if sum(accessor["count"] for accessor in found) * 12 > MAX_FILE_BYTES:
+        raise RefusedError(f"more than {MAX_FILE_BYTES >> 20} MiB of positions")
+    for accessor in found:
+        view = document["bufferViews"][accessor["bufferView"]]
+        kind = np.dtype(_NORMALISED[accessor["componentType"]])
+        start = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
+        strides = (view.get("byteStride", 3 * kind.itemsize), kind.itemsize)
+        steps = np.ndarray((accessor["count"], 3), kind, buffers[f"buffer{view['buffer']}"], start, strides)
+        floats = np.maximum(steps / np.iinfo(kind).max, -1).astype("<f4").tobytes()
+        document["bufferViews"].append({"buffer": len(buffers), "byteLength": len(floats)})
+        buffers[f"buffer{len(buffers)}"] = floats
+        accessor |= {"bufferView": len(document["bufferViews"]) - 1, "byteOffset": 0, "componentType": 5126}
 
 
 def _triangle_count(mesh: dict[str, Any], accessors: list[dict[str, Any]]) -> int:
