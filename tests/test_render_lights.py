@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fsid.assets import survey_skies
 from fsid.errors import FsidError
 from fsid.render import Frame, Renderer
 from fsid.render.drawable import Drawable, View, background_drawable, panel_drawable, view_of
@@ -328,6 +329,31 @@ def test_a_sky_of_a_file_is_read_and_scaled(tmp_path) -> None:
     picture = panorama(Sky(f"file:{path}", (1.0, 1.0, 1.0)))
     assert picture.shape == (16, 32, 3)
     np.testing.assert_allclose(picture[3, 3] / picture[3, 3, 0], (1.0, 0.5, 0.25), rtol=1e-5)
+
+
+def test_channels_of_an_exr_sky_may_differ_in_precision_and_dip_below_zero(tmp_path) -> None:
+    import OpenEXR
+
+    light = np.random.default_rng(0).uniform(0.5, 2, (16, 32, 3)).astype(np.float16)
+    skies = []
+    for name, low in (("even", 0.0), ("odd", -0.01)):
+        light[2, 3] = low
+        channels = {c: np.ascontiguousarray(light[..., i]) for i, c in enumerate("RGB")}
+        channels |= {"G": channels["G"].astype(np.float32)} if name == "odd" else {}
+        with OpenEXR.File({"type": OpenEXR.scanlineimage}, channels) as file:
+            file.write(str(tmp_path / f"{name}.exr"))
+        skies.append(panorama(Sky(f"file:{tmp_path / name}.exr", ONE)))
+    np.testing.assert_array_equal(*skies)
+    assert skies[0].min() == 0
+
+
+def test_a_sky_in_another_colour_space_is_refused(tmp_path) -> None:
+    path = tmp_path / "sky.hdr"
+    path.write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_xyze\n\n-Y 16 +X 32\n" + bytes([128]) * (16 * 32 * 4))
+    with pytest.raises(FsidError, match="holds CIE XYZ"):
+        panorama(Sky(f"file:{path}", ONE))
+    with pytest.raises(FsidError, match=r"no panorama.*R, G and B"):
+        survey_skies(str(tmp_path))
 
 
 def test_a_background_without_a_material_is_named() -> None:

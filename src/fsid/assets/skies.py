@@ -18,6 +18,8 @@ from fsid.assets.file_names import NOT_TEXT, shown
 from fsid.errors import FsidError
 
 SKY_SUFFIXES = (".hdr", ".exr")
+XYZE = b"FORMAT=32-bit_rle_xyze"
+"""In the header of a Radiance picture whose numbers are CIE XYZ."""
 LEAST_HEIGHT_PX = 16
 _HEADER_BYTES = 65536
 _RADIANCE = re.compile(rb"#\?.*?\n\n-Y (\d{1,6}) \+X (\d{1,6})\n", re.DOTALL)
@@ -76,7 +78,7 @@ def _radiance_size(path: Path) -> tuple[int, int] | None:
     """(width, height) of a .hdr."""
     with path.open("rb") as file:
         found = _RADIANCE.match(file.read(_HEADER_BYTES))
-    return (int(found[2]), int(found[1])) if found else None
+    return (int(found[2]), int(found[1])) if found and XYZE not in found[0] else None
 
 
 def _exr_size(path: Path) -> tuple[int, int] | None:

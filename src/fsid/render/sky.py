@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fsid.assets.skies import XYZE
 from fsid.errors import FsidError
 from fsid.scene.colour import LUMINANCE
 from fsid.scene.model import Sky
@@ -120,21 +121,22 @@ def _read_exr(path: Path) -> np.ndarray:
     import OpenEXR
 
     try:
-        with OpenEXR.File(str(path)) as file:
+        with OpenEXR.File(str(path), separate_channels=True) as file:
             channels = file.channels()
-            pixels = channels["RGB"].pixels if "RGB" in channels else channels["RGBA"].pixels[..., :3]
+            pixels = np.stack([np.asarray(channels[c].pixels, np.float32) for c in "RGB"], axis=-1)
     except (OSError, RuntimeError, KeyError, ValueError):
         raise FsidError(f"{path}: is truncated, unreadable or no OpenEXR picture with R, G and B") from None
-    return _equirectangular(np.asarray(pixels, np.float32), path)
+    return _equirectangular(pixels, path)
 
 
 def _equirectangular(picture: np.ndarray, path: Path) -> np.ndarray:
+    """`picture` if it is one; negative values, which the filters of stitching leave, become 0."""
     height, width = picture.shape[:2]
     if width != 2 * height or height < 16:
         raise FsidError(f"{path}: {width} x {height} is no equirectangular picture (twice as wide as high)")
-    if not np.isfinite(picture).all() or picture.min() < 0:
-        raise FsidError(f"{path}: has negative values or values that are not numbers")
-    return picture
+    if not np.isfinite(picture).all():
+        raise FsidError(f"{path}: holds NaN or infinite values")
+    return picture.clip(min=0)
 
 
 def _radiance_hdr(data: bytes, path: Path) -> np.ndarray:
@@ -145,6 +147,8 @@ def _radiance_hdr(data: bytes, path: Path) -> np.ndarray:
     words = size_line.split()
     if not header.startswith(b"#?") or len(words) != 4 or words[0] != b"-Y" or words[2] != b"+X":
         raise broken
+    if XYZE in header:
+        raise FsidError(f"{path}: holds CIE XYZ; convert it to R, G, B")
     try:
         height, width = int(words[1]), int(words[3])
     except ValueError:
