@@ -14,11 +14,13 @@ import trimesh
 
 from fsid.assets import MaterialMaps, build_mesh
 from fsid.cli.main import main
+from fsid.dataset import generate_config
+from fsid.dataset.attempt import Attempt
 from fsid.render.camera import lens_of
 from fsid.render.gltf import LUMENS_PER_WATT, glb_bytes
 from fsid.render.gltf_textures import base_colour, boxed, normals
 from fsid.render.parts import Surface, parts_of, turn
-from fsid.scene import scene_from_json
+from fsid.scene import scene_from_json, scene_to_json
 from fsid.scene.model import Background, Camera, Light, Material, Object, Scene, Transform
 
 WALLS = ("floor", "ceiling", "wall_north", "wall_south", "wall_east", "wall_west")
@@ -207,3 +209,17 @@ def test_the_command_writes_it_whole(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert stop.value.code == 2
     assert ".json or .glb" in capsys.readouterr().err
     assert [file.name for file in tmp_path.iterdir()] == ["scene.glb"]
+
+
+def test_the_command_writes_the_scene_of_a_sample(tmp_path: Path):
+    """Whatever the settings say that the sample was made with: size, variant, and the task's motion."""
+    settings = {"width": 96, "height": 64, "variant": "objects", "task": "deblur"}
+    (tmp_path / "own.yaml").write_text(json.dumps(settings | {"scene": {"objects": [2, 3]}}))
+    scene = Attempt(generate_config(tmp_path / "own.yaml"), 0, 0).drawn_scene()
+    main(["scene", str(scene.seed), "-o", str(tmp_path / "a.json"), "--config", str(tmp_path / "own.yaml")])
+    assert (tmp_path / "a.json").read_text() == scene_to_json(scene)
+    main(
+        ["scene", "1", "-o", str(tmp_path / "b.json"), "--set", "width=64", "height=48", "variant=materials"]
+    )
+    drawn = scene_from_json((tmp_path / "b.json").read_text())
+    assert (drawn.variant, drawn.cameras[0].width, drawn.cameras[0].height) == ("materials", 64, 48)

@@ -20,7 +20,7 @@ def preview(
     set: tuple[str, ...] = (),
     width: int = 480,
     height: int = 270,
-    variant: Variant = "full",
+    variant: Variant | None = None,
     quiet: bool = False,
 ) -> None:
     """Render scenes 0 .. COUNT-1 of a seed into one picture, without noise: what a dataset would hold.
@@ -35,13 +35,15 @@ def preview(
         set: Single settings, key=value.
         width: Width of one scene in pixels.
         height: Height of one scene in pixels.
-        variant: What varies between scenes.
+        variant: What varies between scenes (default full).
         quiet: No progress bar.
     """
     from fsid.dataset import check_png, contact_sheet, dataset_config, generate_config, save_png
 
     check_png(output)
-    overrides = [*set, f"width={width}", f"height={height}", f"variant={variant}"]
+    overrides = [*set, f"width={width}", f"height={height}"]
+    if variant is not None:
+        overrides.append(f"variant={variant}")
     settings = generate_config(config, overrides)
     dataset_config(settings, seed)
     read_mesh_folders(settings.scene, quiet=quiet)
