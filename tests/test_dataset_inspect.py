@@ -36,6 +36,12 @@ def test_slope_of_a_known_spectrum(slope):
     assert spectrum_slope(_noise(slope)) == pytest.approx(slope, abs=0.15)
 
 
+@pytest.mark.parametrize("size", [16, 24, 32, 48])
+def test_small_pictures_have_all_statistics_too(size):
+    image = np.random.default_rng(0).uniform(0.2, 0.8, (size, size + 6, 3))
+    assert all(np.isfinite(values).all() for values in measure(image).values())
+
+
 def test_a_uniform_grey_picture_has_no_edges_no_colour_and_is_flat():
     values = measure(np.full((96, 96, 3), 0.5, np.float32))
     assert values["edge_ratio"] == 0

@@ -78,7 +78,7 @@ class Comparison:
 
 
 def measure(image: np.ndarray) -> dict[str, np.ndarray]:
-    """All statistics of one picture (H, W, 3), sRGB-encoded 0..1, at least 64 pixels on each side."""
+    """All statistics of one picture (H, W, 3), sRGB-encoded 0..1, at least 16 pixels on each side."""
     image = np.asarray(image, np.float32)
     luma = image @ _LUMA
     return {
@@ -122,7 +122,8 @@ def compare(values: Values, reference: Values, other: Values | None = None) -> l
 def spectrum_slope(luma: np.ndarray) -> float:
     """Exponent of power ~ frequency^slope over 0.04 .. 0.35 cycles/pixel; about -2 for natural images.
 
-    Central square, Hann window, mean over directions in logarithmic bands (Field 1987).
+    Central square, Hann window, mean over directions in logarithmic bands (Field 1987); in pictures of fewer
+    than 64 pixels some bands hold no frequency and are left out.
     """
     size = min(luma.shape)
     top, left = ((n - size) // 2 for n in luma.shape)
@@ -132,8 +133,9 @@ def spectrum_slope(luma: np.ndarray) -> float:
     frequency = np.hypot(np.fft.fftfreq(size)[:, None], np.fft.rfftfreq(size))
     edges = np.geomspace(0.04, 0.35, 13)
     band = np.digitize(frequency, edges)
-    levels = [np.log(power[band == i].mean() + 1e-12) for i in range(1, len(edges))]
-    slope, _ = np.polyfit(np.log(np.sqrt(edges[1:] * edges[:-1])), levels, 1)
+    held = [i for i in range(1, len(edges)) if (band == i).any()]
+    levels = [np.log(power[band == i].mean() + 1e-12) for i in held]
+    slope, _ = np.polyfit(np.log(np.sqrt(edges[1:] * edges[:-1]))[np.array(held) - 1], levels, 1)
     return float(slope)
 
 
