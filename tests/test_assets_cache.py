@@ -146,6 +146,14 @@ def test_a_folder_that_cannot_be_written_is_done_without(tmp_path, monkeypatch):
     assert bake_material("paint", 0, 64).mix.shape == (64, 64)
 
 
+def test_entries_may_be_read_by_whom_the_umask_lets(folder):
+    bake_material("paint", 0, 64)
+    (folder / "probe").touch()
+    (entry,) = folder.rglob("paint*.npz")
+    assert entry.stat().st_mode == (folder / "probe").stat().st_mode
+    assert not list(folder.rglob("*.part"))
+
+
 def test_the_folder_follows_the_environment(monkeypatch):
     monkeypatch.setenv("FSID_CACHE", "/somewhere")
     assert bake_cache.cache_folder("materials") == Path("/somewhere/materials")

@@ -18,7 +18,7 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 import os
-import tempfile
+import secrets
 import zipfile
 import zlib
 from collections.abc import Callable, Iterable
@@ -156,11 +156,10 @@ def _array(member: bytes) -> np.ndarray:
 
 
 def _write(path: Path, arrays: Arrays, worth: float) -> None:
-    part = None
+    part = path.with_name(f"{path.name}.{secrets.token_hex(8)}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, part = tempfile.mkstemp(suffix=".part", dir=path.parent)
-        with os.fdopen(handle, "wb") as file, zipfile.ZipFile(file, "w", compresslevel=1) as archive:
+        with part.open("xb") as file, zipfile.ZipFile(file, "w", compresslevel=1) as archive:
             for name, array in arrays.items():
                 member = BytesIO()
                 np.lib.format.write_array(member, np.ascontiguousarray(array), (1, 0), allow_pickle=False)
@@ -170,8 +169,8 @@ def _write(path: Path, arrays: Arrays, worth: float) -> None:
         os.replace(part, path)
         _count(path.parent, size_bytes)
     except OSError:
-        if part is not None:
-            Path(part).unlink(missing_ok=True)
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
 
 
 def _deflates(array: np.ndarray, worth: float) -> bool:
