@@ -205,6 +205,39 @@ def test_only_stated_public_domain_counts_as_cc0(tmp_path: Path):
     assert reasons[f"file:{tmp_path}/b/deep/cube.obj"] == "licence 'CC BY 4.0' is not CC0"
 
 
+BY_40 = """Attribution 4.0 International
+
+     Creative Commons Corporation ("Creative Commons") is not a law firm.
+
+Creative Commons is not a party to its public licenses. The text of the Creative Commons public licenses is
+dedicated to the public domain under the CC0 Public Domain Dedication.
+"""
+ZERO = (
+    "Creative Commons Legal Code\n\nCC0 1.0 Universal\n\n    CREATIVE COMMONS CORPORATION IS NOT A LAW FIRM"
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "free"),
+    [
+        (ZERO, True),
+        ("Kit (2.0)\n\nLicense: (Creative Commons Zero, CC0)\ncreativecommons.org/publicdomain/zero", True),
+        ("In the public domain.", True),
+        (BY_40, False),
+        ("Chairs: CC0. Tables: CC BY 3.0.", False),
+        ("https://creativecommons.org/licenses/by-sa/4.0/, formerly CC0", False),
+    ],
+)
+def test_a_licence_that_names_cc0_beside_another_is_not_cc0(tmp_path: Path, text: str, free: bool):
+    (tmp_path / "cube.obj").write_text(cube_obj())
+    (tmp_path / "LICENSE").write_text(text)
+    (source,) = survey_meshes(str(tmp_path)).usable
+    assert (source.licence == "CC0") == free
+    if not free:
+        with pytest.raises(FsidError, match="is not CC0"):
+            mesh_sources(tmp_path, cc0_only=True)
+
+
 def test_the_cache_changes_nothing_and_follows_the_file(tmp_path: Path, own_cache: Path):
     file = tmp_path / "model.obj"
     file.write_text(cube_obj(material="glass"))

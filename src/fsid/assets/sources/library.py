@@ -42,6 +42,9 @@ PREFIX = "file:"
 
 LIBRARY_SUFFIX = ".sh3f"
 _CC0 = re.compile(r"\bcc[ -]?(?:0|zero)\b|public[ -]domain|creativecommons\.org/publicdomain", re.IGNORECASE)
+_ATTRIBUTION = re.compile(
+    r"\bcc[ -]by\b|\battribution\b[\w -]* \d\.\d|creativecommons\.org/licenses/", re.IGNORECASE
+)
 _LICENCE_FILES = re.compile(r"(?:licen[cs]e|copying|cc0)\b.*|.*licen[cs]e\.txt", re.IGNORECASE)
 _SIZES_M = (0.01, 20.0)
 _GUESSED_M = (0.02, 5.0)
@@ -90,7 +93,7 @@ def survey_meshes(
         if shown(name) != name:
             skipped.append((shown(name), NOT_TEXT))
             continue
-        if cc0_only and not _CC0.search(licence):
+        if cc0_only and not _is_cc0(licence):
             skipped.append((name, f"licence '{licence or 'unknown'}' is not CC0"))
             continue
         try:
@@ -186,9 +189,14 @@ def _licence_beside(folder: Path, root: Path) -> str:
             with (folder / name).open(encoding="utf-8", errors="replace") as file:
                 text = file.read(20_000)
             first = next((line.strip() for line in text.splitlines() if line.strip()), "")
-            return "CC0" if _CC0.search(text) else first[:200]
+            return "CC0" if _is_cc0(text) else first[:200]
     inside = folder != root and root in folder.parents
     return _licence_beside(folder.parent, root) if inside else ""
+
+
+def _is_cc0(text: str) -> bool:
+    """Whether a licence is CC0 alone: the text of CC BY names CC0, too, as the licence of its own text."""
+    return bool(_CC0.search(text)) and not _ATTRIBUTION.search(text)
 
 
 @lru_cache(maxsize=16)
