@@ -285,6 +285,15 @@ def test_positions_of_normalised_integers_are_fractions(tmp_path: Path, kind: st
     np.testing.assert_allclose(np.ptp(mesh.vertices, axis=0), expected, rtol=1e-4)
 
 
+@pytest.mark.parametrize("suffix", ["ply", "glb"])
+def test_points_without_a_face_have_no_part_in_the_size(tmp_path: Path, suffix: str):
+    cube = trimesh.creation.box((1.0, 2.0, 3.0))
+    points = np.vstack([cube.vertices, (1e6, 0, 0)])
+    trimesh.Trimesh(points, cube.faces, process=False).export(tmp_path / f"cube.{suffix}")
+    (source,) = survey_meshes(str(tmp_path)).usable
+    np.testing.assert_allclose(sorted(source.size_m), (1, 2, 3), rtol=1e-5)
+
+
 @pytest.mark.parametrize(("field", "value"), [(10, 77), (8, 1), (None, 0xFF)])
 def test_a_damaged_mesh_in_the_cache_is_made_again(tmp_path: Path, own_cache: Path, field, value: int):
     file = tmp_path / "model.obj"

@@ -106,7 +106,11 @@ def _joined(pieces: list[tuple[str, np.ndarray, np.ndarray]]) -> Triangles:
         faces.append(corners.reshape(-1, 3) + start)
         parts.append(np.full(len(corners), names.index(name)))
         start += len(points)
-    return Triangles(np.concatenate(vertices), np.concatenate(faces), np.concatenate(parts), tuple(names))
+    points, corners = np.concatenate(vertices), np.concatenate(faces)
+    used = np.zeros(len(points), bool)
+    used[corners] = True  # what no face uses has no part in the extent, by which the unit is told
+    corners = (np.cumsum(used) - 1)[corners]
+    return Triangles(points[used], corners, np.concatenate(parts), tuple(names))
 
 
 def _one_line(error: BaseException) -> str:
