@@ -344,6 +344,21 @@ def test_a_refusal_that_may_pass_is_not_kept(tmp_path: Path, monkeypatch: pytest
     assert len(load_source(f"file:{tmp_path}/cube.obj").faces) == 12
 
 
+def test_a_licence_that_cannot_be_read_says_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    (tmp_path / "cube.obj").write_text(cube_obj())
+    (tmp_path / "LICENSE").write_text(ZERO)
+    opened = Path.open
+
+    def denied(path: Path, *arguments, **options):
+        if path.name == "LICENSE":
+            raise PermissionError(13, "Permission denied", str(path))
+        return opened(path, *arguments, **options)
+
+    monkeypatch.setattr(Path, "open", denied)
+    (source,) = survey_meshes(str(tmp_path)).usable
+    assert source.licence == ""
+
+
 def test_the_seed_plays_no_part(tmp_path: Path):
     (tmp_path / "cube.obj").write_text(cube_obj())
     (name,) = mesh_sources(tmp_path)

@@ -186,8 +186,11 @@ def _licence_beside(folder: Path, root: Path) -> str:
     """What the nearest licence file from `folder` up to `root` says: "CC0", or its first line."""
     for name in sorted(os.listdir(folder)):
         if _LICENCE_FILES.fullmatch(name) and (folder / name).is_file():
-            with (folder / name).open(encoding="utf-8", errors="replace") as file:
-                text = file.read(20_000)
+            try:
+                with (folder / name).open(encoding="utf-8", errors="replace") as file:
+                    text = file.read(20_000)
+            except OSError:
+                return ""
             first = next((line.strip() for line in text.splitlines() if line.strip()), "")
             return "CC0" if _is_cc0(text) else first[:200]
     inside = folder != root and root in folder.parents
