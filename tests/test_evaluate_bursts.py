@@ -11,7 +11,8 @@ import pytest
 from scipy.ndimage import shift
 
 from fsid.cli.main import main
-from fsid.evaluate import psnr, read_testset, simulated_testset
+from fsid.errors import FsidError
+from fsid.evaluate import burst_testset, psnr, read_testset, simulated_testset
 from fsid.evaluate.bursts import average
 from fsid.sensor import Raw, load_profile, noisy_from_clean, read_raw, write_dng
 
@@ -51,7 +52,7 @@ def shifted(mosaic: np.ndarray, tiles: float) -> np.ndarray:
 
 def test_the_error_of_the_truth_is_what_it_says(clean: Raw, tmp_path: Path):
     paths = _burst(tmp_path / "b", clean)
-    truth, quality = average(paths[1:], paths[0])
+    truth, quality, _ = average(paths[1:], paths[0])
     inner = clean.mosaic < 0.9
     error = (truth.mosaic - clean.mosaic)[inner].std()
     assert quality.frames == FRAMES - 1
@@ -65,7 +66,7 @@ def test_flicker_is_divided_out(clean: Raw, tmp_path: Path):
     paths = _burst(
         tmp_path / "b", clean, lambda raw, f: replace(raw, mosaic=raw.mosaic * np.float32(flicker[f]))
     )
-    truth, quality = average(paths[1:], paths[0])
+    truth, quality, _ = average(paths[1:], paths[0])
     assert quality.flicker == pytest.approx(np.abs(flicker[1:] - 1).max(), rel=0.1)
     assert (truth.mosaic - clean.mosaic)[clean.mosaic < 0.8].std() < 1.3 * quality.error
 
@@ -79,10 +80,62 @@ def test_whole_shifts_are_undone_and_others_left_out(clean: Raw, tmp_path: Path)
         return raw
 
     paths = _burst(tmp_path / "b", clean, moved)
-    truth, quality = average(paths[1:], paths[0])
+    truth, quality, window = average(paths[1:], paths[0])
     assert quality.left_out == 1
     assert quality.shift_px == pytest.approx(np.hypot(4, 6))
-    assert (truth.mosaic - clean.mosaic)[clean.mosaic < 0.9].std() < 1.3 * quality.error
+    seen = clean.mosaic[window]
+    assert (truth.mosaic - seen)[seen < 0.9].std() < 1.3 * quality.error
+
+
+def test_a_first_frame_that_the_shutter_shook_leaves_no_bare_edge(clean: Raw, tmp_path: Path):
+    def shaken(raw: Raw, frame: int) -> Raw:
+        return replace(raw, mosaic=np.roll(raw.mosaic, (4, -6), (0, 1))) if frame else raw
+
+    _burst(tmp_path / "captures" / "fabric" / "1lux", clean, shaken)
+    testset, (quality,) = burst_testset(tmp_path / "captures", tmp_path / "set")
+    image = testset.images[0]
+    truth = read_raw(testset.clean(tmp_path / "set", image, "1lux"))
+    noisy = read_raw(testset.noisy(tmp_path / "set", image, "1lux"))
+    height, width = clean.mosaic.shape
+    assert truth.mosaic.shape == noisy.mosaic.shape == (height - 4, width - 6)
+    assert (truth.mosaic - clean.mosaic[:-4, 6:])[clean.mosaic[:-4, 6:] < 0.9].std() < 1.3 * quality.error
+    expected = psnr(noisy.mosaic, clean.mosaic[:-4, 6:])
+    assert psnr(noisy.mosaic, truth.mosaic) == pytest.approx(expected, abs=0.5)
+
+
+@pytest.mark.parametrize("change", ["moved", "brighter"])
+def test_further_noisy_frames_are_those_that_the_truth_fits(clean: Raw, tmp_path: Path, change: str):
+    def second(raw: Raw, frame: int) -> Raw:
+        other = np.roll(raw.mosaic, (4, -6), (0, 1)) if change == "moved" else raw.mosaic * np.float32(1.1)
+        return replace(raw, mosaic=other) if frame == 1 else raw
+
+    _burst(tmp_path / "captures" / "fabric" / "1lux", clean, second)
+    testset, (quality,) = burst_testset(tmp_path / "captures", tmp_path / "set", frames=3)
+    image = testset.images[0]
+    truth = read_raw(testset.clean(tmp_path / "set", image, "1lux"))
+    first, *others = (
+        psnr(read_raw(testset.noisy(tmp_path / "set", image, "1lux", n)).mosaic, truth.mosaic)
+        for n in range(3)
+    )
+    assert others == pytest.approx([first] * 2, abs=0.5)
+    assert quality.frames == FRAMES - 3
+
+
+def test_too_few_still_frames_for_the_noisy_ones_are_named(clean: Raw, tmp_path: Path):
+    steps = 1 + 0.04 * np.arange(FRAMES)
+    _burst(tmp_path / "a" / "b" / "c", clean, lambda r, f: replace(r, mosaic=r.mosaic * np.float32(steps[f])))
+    with pytest.raises(FsidError, match="--frames 3: only 1 of 12"):
+        burst_testset(tmp_path / "a", tmp_path / "set", frames=3)
+
+
+def test_hidden_files_and_pictures_beside_the_raws_are_no_frames(clean: Raw, tmp_path: Path):
+    paths = _burst(tmp_path / "captures" / "fabric" / "1lux", clean)
+    for name in ("000.jpg", "000.xmp", "._000.dng"):
+        paths[0].with_name(name).write_bytes(b"no RAW")
+    for hidden in (".thumbnails/1lux", "fabric/.cache"):
+        (tmp_path / "captures" / hidden).mkdir(parents=True)
+    testset, _ = burst_testset(tmp_path / "captures", tmp_path / "set")
+    assert testset.levels == ("1lux",)
 
 
 def test_a_fly_on_the_chart_is_an_outlier(clean: Raw, tmp_path: Path):
@@ -93,7 +146,7 @@ def test_a_fly_on_the_chart_is_an_outlier(clean: Raw, tmp_path: Path):
         return replace(raw, mosaic=mosaic)
 
     paths = _burst(tmp_path / "b", clean, fly)
-    truth, quality = average(paths[1:], paths[0])
+    truth, quality, _ = average(paths[1:], paths[0])
     error = np.abs(truth.mosaic - clean.mosaic)[20:30, 40:50].mean()
     assert error < 3 * quality.error
     assert quality.outliers > 0

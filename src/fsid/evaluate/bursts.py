@@ -4,9 +4,10 @@
 
     CAPTURES/<scene>/<level>/*.dng        one burst each: static scene, locked focus, exposure and ISO
 
-The first frames of a burst are the noisy test frames and stay out of the truth, else its noise would be
-theirs. g_f is the flicker of the light; a frame that moved is shifted back where the shift is a whole number
-of CFA tiles, and left out where it is not, since interpolating would blur the truth.
+The first frame of a burst is the noisy test frame and stays out of the truth, else its noise would be the
+truth's, too; further ones are the first that lie on it in the same light. g_f is the flicker of the light; a
+frame that moved is shifted back where the shift is a whole number of CFA tiles, and left out where it is not,
+since interpolating would blur the truth. Truth and noisy frames are cut to what all frames show.
 """
 
 from __future__ import annotations
@@ -28,11 +29,19 @@ from fsid.sensor import NoiseLevel, Raw, clean_levels, estimate_noise, load_prof
 OUTLIER_SIGMA = 4.0
 MAX_FLICKER = 0.2
 """A frame whose brightness differs by more from the first is left out."""
+MAX_NOISY_FLICKER = 0.01
+"""The same for a noisy frame beside the first: the truth has the light of the first."""
 MAX_SUBPIXEL = 0.15
 """Largest rest of a shift, in CFA tiles, that a frame of the truth may have."""
 MAX_SHIFT_TILES = 32
+MAX_SHIFT_SHARE = 1 / 8
+"""Largest shift, in edges of the image."""
 LEAST_FRAMES = 3
 _PATCH_TILES = 7
+_BESIDE_RAW = frozenset((".jpg", ".jpeg", ".heic", ".heif", ".xmp"))
+"""What phones and converters store beside a RAW file."""
+
+Window = tuple[slice, slice]
 
 
 @dataclass(frozen=True)
@@ -88,10 +97,12 @@ def burst_testset(
         for done, ((scene, level), paths) in enumerate(bursts.items()):
             progress(done, len(bursts))
             (root / scene).mkdir(exist_ok=True)
-            truth, quality = average(paths[frames:], paths[0], scene, level)
+            noisy = _noisy_frames(paths, frames)
+            others = [path for path in paths if path not in noisy]
+            truth, quality, window = average(others, paths[0], scene, level)
             write_dng(root / scene / f"{level}.clean.dng", clean_levels(truth))
-            for frame, path in enumerate(paths[:frames]):
-                raw = read_raw(path)
+            for frame, path in enumerate(noisy):
+                raw = _cut(read_raw(path), window)
                 name = name or raw.camera
                 target = root / scene / f"{level}.noisy{f'.{frame:02d}' if frame else ''}.dng"
                 write_dng(target, replace(raw, noise=_noise(raw, camera)))
@@ -106,8 +117,11 @@ def burst_testset(
 
 def average(
     paths: Sequence[Path], reference: Path, image: str = "", level: str = ""
-) -> tuple[Raw, TruthQuality]:
-    """The robust mean of the frames at `paths`, placed on the frame `reference`; reads every file thrice."""
+) -> tuple[Raw, TruthQuality, Window]:
+    """The robust mean of the frames at `paths`, placed on the frame `reference`; reads every file thrice.
+
+    The window is that of `reference` which all frames show; the mean is of it.
+    """
     first = read_raw(reference)
     placed = [p for p in (_place(path, first) for path in paths) if p is not None]
     if len(placed) < LEAST_FRAMES:
@@ -115,14 +129,14 @@ def average(
             f"{reference.parent}: only {len(placed)} of {len(paths)} frames lie still and have steady light; "
             f"at least {LEAST_FRAMES} are needed. Use a tripod and a lamp that does not flicker"
         )
-    mean, variance = _moments(placed)
+    window = _common_window(placed, first)
+    mean, variance = _moments(placed, window)
     sigma = np.sqrt(_spread_over_site(variance, first.cfa))
-    total, used, seen = np.zeros(mean.shape), np.zeros(mean.shape), 0
-    for x in _frames(placed):
+    total, used = np.zeros(mean.shape), np.zeros(mean.shape)
+    for x in _frames(placed, window):
         kept = np.abs(x - mean) <= OUTLIER_SIGMA * sigma + 1e-9
         total += np.where(kept, x, 0)
         used += kept
-        seen += int(np.isfinite(x).sum())
     truth = np.where(used > 0, total / np.maximum(used, 1), mean).astype(np.float32)
     error = float(np.sqrt(np.mean(sigma.astype(np.float64) ** 2) / len(placed)))
     quality = TruthQuality(
@@ -132,19 +146,20 @@ def average(
         left_out=len(paths) - len(placed),
         error=error,
         psnr=float(-20 * np.log10(max(error, 1e-9))),
-        outliers=float(1 - used.sum() / seen),
+        outliers=float(1 - used.mean() / len(placed)),
         flicker=max(abs(p.gain - 1) for p in placed),
         shift_px=float(max(np.hypot(*p.roll) for p in placed)),
     )
-    return replace(first, mosaic=truth, noise=None), quality
+    return replace(_cut(first, window), mosaic=truth, noise=None), quality, window
 
 
 def _find_bursts(captures: Path, frames: int) -> dict[tuple[str, str], list[Path]]:
     if not captures.is_dir():
         raise FsidError(f"{captures}: is not a folder of captures")
     found: dict[tuple[str, str], list[Path]] = {}
-    for folder in sorted(p for p in captures.glob("*/*") if p.is_dir()):
-        paths = sorted(p for p in folder.iterdir() if p.is_file() and not p.name.startswith("."))
+    for folder in sorted(p for p in captures.glob("[!.]*/[!.]*") if p.is_dir()):
+        files = (p for p in folder.iterdir() if p.is_file() and not p.name.startswith("."))
+        paths = sorted(p for p in files if p.suffix.lower() not in _BESIDE_RAW)
         if len(paths) < frames + LEAST_FRAMES:
             raise FsidError(
                 f"{folder}: holds {len(paths)} frames; {frames} noisy and at least {LEAST_FRAMES} more for "
@@ -154,6 +169,24 @@ def _find_bursts(captures: Path, frames: int) -> dict[tuple[str, str], list[Path
     if not found:
         raise FsidError(
             f"{captures}: holds no bursts; expected <scene>/<level>/frames, for example star/0.5lux/"
+        )
+    return found
+
+
+def _noisy_frames(paths: Sequence[Path], frames: int) -> list[Path]:
+    """The first frame of a burst, and the next ones that lie on it in the same light."""
+    first = read_raw(paths[0])
+    found = [paths[0]]
+    for path in paths[1:]:
+        if len(found) == frames:
+            break
+        placed = _place(path, first)
+        if placed and placed.roll == (0, 0) and abs(placed.gain - 1) <= MAX_NOISY_FLICKER:
+            found.append(path)
+    if len(found) < frames:
+        raise FsidError(
+            f"{paths[0].parent}: --frames {frames}: only {len(found)} of {len(paths)} frames lie on the "
+            "first one in the same light"
         )
     return found
 
@@ -170,7 +203,8 @@ def _place(path: Path, first: Raw) -> _Placed | None:
     if not abs(gain - 1) <= MAX_FLICKER:
         return None
     whole, rest = _shift(ours, theirs)
-    if np.abs(rest).max() > MAX_SUBPIXEL or np.abs(whole).max() > MAX_SHIFT_TILES:
+    most = min(MAX_SHIFT_TILES, MAX_SHIFT_SHARE * min(ours.shape))
+    if np.abs(rest).max() > MAX_SUBPIXEL or np.abs(whole).max() > most:
         return None
     return _Placed(path, (2 * int(whole[0]), 2 * int(whole[1])), gain)
 
@@ -195,27 +229,34 @@ def _green(raw: Raw) -> np.ndarray:
     return uniform_filter((packed[1] + packed[2]) / 2, 3)
 
 
-def _frames(placed: Sequence[_Placed]) -> Iterator[np.ndarray]:
-    """The frames in place, without flicker; NaN where a shifted frame has nothing."""
+def _common_window(placed: Sequence[_Placed], first: Raw) -> Window:
+    """Rows and columns of `first` that every frame has once it is put back."""
+    height, width = first.mosaic.shape
+    rolls = np.array([(0, 0), *(p.roll for p in placed)])
+    (top, left), (bottom, right) = rolls.max(axis=0), rolls.min(axis=0)
+    return slice(top, height + bottom), slice(left, width + right)
+
+
+def _cut(raw: Raw, window: Window) -> Raw:
+    mosaic = raw.mosaic[window]
+    height, width = mosaic.shape
+    return replace(raw, mosaic=mosaic, metadata=raw.metadata.within(width, height))
+
+
+def _frames(placed: Sequence[_Placed], window: Window) -> Iterator[np.ndarray]:
+    """What the frames, in place, have in the window, without flicker."""
     for p in placed:
-        x = np.roll(read_raw(p.path).mosaic, p.roll, axis=(0, 1)) / np.float32(p.gain)
-        for axis, by in enumerate(p.roll):
-            edge = slice(None, by) if by > 0 else slice(by, None)
-            if by:
-                x[(slice(None),) * axis + (edge,)] = np.nan
-        yield x
+        yield np.roll(read_raw(p.path).mosaic, p.roll, axis=(0, 1))[window] / np.float32(p.gain)
 
 
-def _moments(placed: Sequence[_Placed]) -> tuple[np.ndarray, np.ndarray]:
+def _moments(placed: Sequence[_Placed], window: Window) -> tuple[np.ndarray, np.ndarray]:
     """Mean and variance over the frames, pixel by pixel (Welford 1962)."""
-    count = mean = square = np.zeros(())
-    for x in _frames(placed):
-        seen = np.isfinite(x)
-        count = count + seen
-        delta = np.where(seen, x - mean, 0)
-        mean = mean + delta / np.maximum(count, 1)
-        square = square + delta * np.where(seen, x - mean, 0)
-    return mean, square / np.maximum(count - 1, 1)
+    mean = square = np.zeros(())
+    for count, x in enumerate(_frames(placed, window), 1):
+        delta = x - mean
+        mean = mean + delta / count
+        square = square + delta * (x - mean)
+    return mean, square / (len(placed) - 1)
 
 
 def _spread_over_site(variance: np.ndarray, cfa: str) -> np.ndarray:
