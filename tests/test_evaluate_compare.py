@@ -14,6 +14,7 @@ import rawpy
 
 from fsid.errors import FsidError
 from fsid.evaluate import CLASSICAL, NOISY, Method, compare, photo_testset, psnr, read_testset, write_results
+from fsid.evaluate.models import model_names
 from fsid.evaluate.report import comparison_sections, write_report
 from fsid.sensor import read_raw
 
@@ -107,6 +108,23 @@ def test_the_report_is_one_file_that_loads_nothing(small_set: Path, tmp_path: Pa
     assert "<script>" not in page
     noisy = next(row for row in comparison.rows if (row.model, row.level) == ("noisy", "iso800"))
     assert f"{noisy.psnr_raw:.2f}" in page
+
+
+def test_models_are_told_apart_by_name(tmp_path: Path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for run in ("lr-0.1", "lr-0.2", "b/lr-0.2"):
+        (tmp_path / run).mkdir(parents=True)
+    assert model_names([Path("lr-0.1"), Path("lr-0.2/model.safetensors")]) == ["lr-0.1", "lr-0.2"]
+    assert model_names([Path("a.onnx"), Path("a.safetensors")]) == ["a.onnx", "a.safetensors"]
+    assert model_names([Path("lr-0.2"), Path("b/lr-0.2"), Path("c/noisy")]) == [
+        "lr-0.2",
+        "b/lr-0.2",
+        "c/noisy",
+    ]
+    with pytest.raises(FsidError, match=r"--model lr-0\.1: is given twice"):
+        model_names([Path("lr-0.1"), Path("lr-0.1")])
+    with pytest.raises(FsidError, match="--model noisy: is the name of a baseline"):
+        model_names([Path("noisy")])
 
 
 @pytest.mark.parametrize(

@@ -97,8 +97,9 @@ def compare(
     Rows cover each set, and all sets together where there is more than one.
     """
     testset = read_testset(root)
-    if len({method.name for method in methods}) < len(methods):
-        raise FsidError("two models have the same name; copy one to another folder name")
+    names = [method.name for method in methods]
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise FsidError(f"{twice[0]}: two models have this name")
     if unknown := set(crop_levels) - set(testset.levels):
         raise FsidError(f"{root}: has no level {', '.join(sorted(unknown))}")
     images: list[ImageRow] = []

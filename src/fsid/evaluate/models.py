@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -19,6 +20,28 @@ def model_method(path: Path, name: str) -> Method:
     return Method(name, model.card.training, lambda raw: denoise_raw(raw, model))
 
 
+def model_names(models: Sequence[Path]) -> list[str]:
+    """What models are called in results: by folder or file, or as given where those names are the same."""
+    short = [_short_name(path) for path in models]
+    taken = Counter([NOISY.name, CLASSICAL.name, *short])
+    names = [str(path) if taken[name] > 1 else name for path, name in zip(models, short, strict=True)]
+    for at, name in enumerate(names):
+        if name in (NOISY.name, CLASSICAL.name, *names[:at]):
+            why = "is given twice" if name in names[:at] else "is the name of a baseline; rename it"
+            raise FsidError(f"--model {name}: {why}")
+    return names
+
+
+def _short_name(path: Path) -> str:
+    """A run folder's name (dots belong to it), or that of a file without its ending."""
+    from fsid.denoise.model import MODEL_FILE
+
+    path = path.resolve()
+    if path.name == MODEL_FILE:
+        path = path.parent
+    return path.name if path.is_dir() else path.stem
+
+
 def evaluate_models(
     testset: Path,
     models: Sequence[Path],
@@ -28,7 +51,8 @@ def evaluate_models(
 ) -> Comparison:
     """Compare the baselines and `models`; writes results.json, images.csv, report.html into `out`."""
     levels = read_testset(testset).levels
-    methods = [NOISY, CLASSICAL, *(model_method(path, path.resolve().stem) for path in models)]
+    named = zip(models, model_names(models), strict=True)
+    methods = [NOISY, CLASSICAL, *(model_method(path, name) for path, name in named)]
     if out is not None:
         _make(out)
     comparison = compare(testset, methods, crop_levels=levels[len(levels) // 2 :][:1], progress=progress)
