@@ -127,6 +127,11 @@ def test_models_are_told_apart_by_name(tmp_path: Path, monkeypatch):
         model_names([Path("noisy")])
 
 
+def _described(**changes: object) -> str:
+    plain = {"camera": "x", "levels": ["iso1"], "images": [{"name": "a", "set": "s"}], "seed": 0, "notes": ""}
+    return json.dumps(plain | changes)
+
+
 @pytest.mark.parametrize(
     ("text", "named"),
     [
@@ -137,6 +142,10 @@ def test_models_are_told_apart_by_name(tmp_path: Path, monkeypatch):
             '"seed": 0, "notes": ""}',
             "plain file name",
         ),
+        (_described(images=[]), "images: there must be"),
+        (_described(levels=[]), "levels: there must be"),
+        (_described(images=[{"name": "a", "set": "s"}] * 2), "images: .* each given once"),
+        (_described(frames=0), "frames 0"),
     ],
 )
 def test_a_broken_test_set_is_named(tmp_path: Path, text: str, named: str):
@@ -157,6 +166,20 @@ def test_a_broken_photograph_leaves_no_test_set(photos: Path, tmp_path: Path):
     with pytest.raises(FsidError, match=r"zzz\.png"):
         photo_testset([tmp_path / "photos"], tmp_path / "out", camera="pixel6", isos=[800])
     assert sorted(path.name for path in tmp_path.iterdir()) == ["photos"]
+
+
+def test_a_set_has_the_name_of_its_folder(photos: Path, tmp_path: Path, monkeypatch):
+    monkeypatch.chdir(photos)
+    assert photo_testset([Path()], tmp_path / "a", camera="pixel6", isos=[800]).images[0].set == photos.name
+    shutil.copytree(photos, tmp_path / "all")
+    with pytest.raises(FsidError, match="all: means all sets together"):
+        photo_testset([photos, tmp_path / "all"], tmp_path / "b", camera="pixel6", isos=[800])
+
+
+def test_the_current_folder_is_no_name_for_a_test_set(photos: Path, tmp_path: Path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(FsidError, match="name a new folder"):
+        photo_testset([photos], Path(), camera="pixel6", isos=[800])
 
 
 def test_an_existing_folder_is_not_overwritten(photos: Path, tmp_path: Path):

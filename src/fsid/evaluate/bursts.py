@@ -85,6 +85,8 @@ def burst_testset(
     camera: noise profile of the captures; "" takes the files' NoiseProfile, or estimates the noise of each
     frame. frames: noisy frames per burst. Raises FsidError that names the burst at fault.
     """
+    if frames < 1:
+        raise FsidError(f"--frames {frames}: at least one noisy frame per burst is needed")
     bursts = _find_bursts(captures, frames)
     scenes = tuple(dict.fromkeys(scene for scene, _ in bursts))
     levels = tuple(sorted({level for _, level in bursts}, key=_level_order))

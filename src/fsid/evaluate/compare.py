@@ -16,7 +16,7 @@ from scipy.special import stdtrit
 from fsid.errors import FsidError
 from fsid.evaluate.classical import denoise_classical
 from fsid.evaluate.metrics import psnr, ssim
-from fsid.evaluate.testset import TestImage, TestSet, read_testset
+from fsid.evaluate.testset import ALL_SETS, TestImage, TestSet, read_testset
 from fsid.sensor import Raw, develop, read_raw
 
 
@@ -79,8 +79,6 @@ class Comparison:
 
 NOISY = Method("noisy", "", lambda raw: raw)
 CLASSICAL = Method("classical", "", denoise_classical)
-
-ALL_SETS = "all"
 
 
 def compare(

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from fsid.evaluate.compare import ALL_SETS, ImageRow, Row
+from fsid.evaluate.compare import ImageRow, Row
 from fsid.evaluate.report import Section, Table, method_label, plot, write_report
+from fsid.evaluate.testset import ALL_SETS
 
 if TYPE_CHECKING:
     from fsid.evaluate.experiments import ExperimentConfig

@@ -17,7 +17,8 @@ from PIL import Image
 from fsid import __version__
 from fsid.dataset import to_uint8
 from fsid.evaluate.classical import bm3d_installed
-from fsid.evaluate.compare import ALL_SETS, Comparison, Crops, Row, confidence
+from fsid.evaluate.compare import Comparison, Crops, Row, confidence
+from fsid.evaluate.testset import ALL_SETS
 
 ERROR_GAIN = 8.0
 """Error maps show |output - truth| of the developed pictures this many times."""

@@ -37,6 +37,9 @@ from fsid.sensor import (
 
 Progress = Callable[[int, int], None]
 
+ALL_SETS = "all"
+"""The name in results of all sets together."""
+
 
 @dataclass(frozen=True)
 class TestImage:
@@ -64,6 +67,14 @@ class TestSet:
     def __post_init__(self) -> None:
         if self.seed < 0:
             raise FsidError(f"seed {self.seed}: must not be negative")
+        if self.frames < 1:
+            raise FsidError(f"frames {self.frames}: must be at least 1")
+        for key, names in (("levels", self.levels), ("images", [image.name for image in self.images])):
+            if not names or len(set(names)) < len(names):
+                raise FsidError(f"{key}: there must be at least one, each given once")
+        sets = {image.set for image in self.images}
+        if len(sets) > 1 and ALL_SETS in sets:
+            raise FsidError(f"{ALL_SETS}: means all sets together, so no single one; rename its folder")
 
     def clean(self, root: Path, image: TestImage, level: str = "") -> Path:
         """Path of the truth of `image` (at `level`)."""
@@ -112,7 +123,7 @@ def photo_testset(
     """
     profile = load_bayer_profile(camera)
     levels = levels_of(profile, isos, luxes)
-    photos = [(folder.name, path) for folder in folders for path in find_photos(folder)]
+    photos = [(folder.resolve().name, path) for folder in folders for path in find_photos(folder)]
     testset = TestSet(
         camera=profile.name,
         levels=tuple(levels),
@@ -181,6 +192,8 @@ def write_testset(root: Path, testset: TestSet) -> None:
 @contextmanager
 def staged(out: Path) -> Iterator[Path]:
     """A folder beside `out` that becomes `out` when all is written, and vanishes where something fails."""
+    if not out.name:
+        raise FsidError(f"{out}: name a new folder")
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise FsidError(f"{out}: exists already and is not empty; use another folder")
     part = out.with_name(f".{out.name}.part")
