@@ -12,9 +12,11 @@ from scipy.ndimage import shift
 
 from fsid.cli.main import main
 from fsid.errors import FsidError
-from fsid.evaluate import burst_testset, psnr, read_testset, simulated_testset
+from fsid.evaluate import NOISY, burst_testset, compare, psnr, read_testset, simulated_testset
 from fsid.evaluate.bursts import average
 from fsid.sensor import Raw, load_profile, noisy_from_clean, read_raw, write_dng
+from fsid.sensor.metadata import ORIENTATION, Metadata
+from fsid.sensor.tiff import SHORT, Tag
 
 FRAMES = 12
 PROFILE = load_profile("pixel6")
@@ -168,6 +170,16 @@ def test_the_command_makes_a_set_that_evaluate_reads(clean: Raw, tmp_path: Path,
     assert np.mean(noisy.noise.k) == pytest.approx(np.mean(PROFILE.level(1600).k), rel=0.01)
     main(["evaluate", str(out)])
     assert "fabric" in capsys.readouterr().out
+
+
+def test_the_report_names_captures_and_shows_them_upright(clean: Raw, tmp_path: Path):
+    turned = replace(clean, metadata=Metadata(first=(Tag(ORIENTATION, SHORT, (6,)),)))
+    _burst(tmp_path / "captures" / "fabric" / "1lux", turned)
+    burst_testset(tmp_path / "captures", tmp_path / "set")
+    crops = compare(tmp_path / "set", [NOISY], crop_levels=["1lux"], crop_px=200).crops[0]
+    assert crops.title == "fabric, 1lux"
+    height, width = clean.mosaic.shape
+    assert crops.truth.shape == crops.by_method["noisy"].shape == (width, height, 3)
 
 
 def test_a_burst_that_moves_all_the_time_is_refused(clean: Raw, tmp_path: Path, capsys):

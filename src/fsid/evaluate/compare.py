@@ -17,7 +17,7 @@ from fsid.errors import FsidError
 from fsid.evaluate.classical import denoise_classical
 from fsid.evaluate.metrics import psnr, ssim
 from fsid.evaluate.testset import ALL_SETS, TestImage, TestSet, read_testset
-from fsid.sensor import Raw, develop, read_raw
+from fsid.sensor import Raw, develop, read_raw, upright
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,8 @@ def compare(
             images.append(ImageRow(method.name, level, image.set, image.name, *mean))
         if level in crop_levels:
             raw_psnr = {row.model: row.psnr_raw for row in images[-len(methods) :]}
-            crops.append(_crops(image, level, developed_truth, outputs, raw_psnr, crop_px))
+            turn = truth.metadata.orientation
+            crops.append(_crops(image, level, developed_truth, outputs, raw_psnr, crop_px, turn))
     progress(len(tasks), len(tasks))
     return Comparison(testset, tuple(summarise(testset, methods, images)), tuple(images), tuple(crops))
 
@@ -199,11 +200,12 @@ def _crops(
     outputs: dict[str, np.ndarray],
     psnr_raw: dict[str, float],
     size: int,
+    orientation: int,
 ) -> Crops:
     window, _ = detailed_window(truth, size)
     return Crops(
-        f"{image.name.partition('-')[2]}, {level}",
-        truth[window],
-        {name: output[window] for name, output in outputs.items()},
+        f"{image.name}, {level}",
+        upright(truth[window], orientation),
+        {name: upright(output[window], orientation) for name, output in outputs.items()},
         psnr_raw,
     )
