@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import rawpy
 
+from fsid.cli.main import main
 from fsid.errors import FsidError
 from fsid.evaluate import CLASSICAL, NOISY, Method, compare, photo_testset, psnr, read_testset, write_results
 from fsid.evaluate.models import model_names
@@ -108,6 +109,22 @@ def test_the_report_is_one_file_that_loads_nothing(small_set: Path, tmp_path: Pa
     assert "<script>" not in page
     noisy = next(row for row in comparison.rows if (row.model, row.level) == ("noisy", "iso800"))
     assert f"{noisy.psnr_raw:.2f}" in page
+
+
+def test_names_are_text_and_nothing_else(small_set: Path, tmp_path: Path, capsys):
+    shutil.copytree(small_set, tmp_path / "set")
+    testset = read_testset(small_set)
+    named = [dataclasses.replace(image, set="[/b] <i>[red]") for image in testset.images]
+    plain = dataclasses.asdict(dataclasses.replace(testset, images=tuple(named)))
+    (tmp_path / "set" / "testset.json").write_text(json.dumps(plain))
+    main(["evaluate", str(tmp_path / "set"), "--quiet"])
+    assert "[/b] <i>[red]: PSNR raw" in capsys.readouterr().out
+    strange = dataclasses.replace(NOISY, name=r"$\no$")
+    comparison = compare(tmp_path / "set", [NOISY, strange], crop_levels=["iso800"], crop_px=64)
+    write_report(tmp_path / "r.html", "title", "lead", comparison_sections(comparison))
+    page = (tmp_path / "r.html").read_text()
+    assert "[/b] &lt;i&gt;[red]" in page
+    assert "<i>" not in page
 
 
 def test_models_are_told_apart_by_name(tmp_path: Path, monkeypatch):

@@ -41,4 +41,4 @@ def demo(
 
     config = DemoConfig(scenes, width, height, steps, photographs, seed)
     report = run_demo(output, config, partial(progress_bar, quiet=quiet))
-    Console().print(f"report: {report.resolve()}", soft_wrap=True)
+    Console(markup=False).print(f"report: {report.resolve()}", soft_wrap=True)

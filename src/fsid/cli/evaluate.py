@@ -39,4 +39,4 @@ def evaluate(
         for method in dict.fromkeys(row.model for row in comparison.rows):
             rows = [row for row in comparison.rows if (row.set, row.model) == (name, method)]
             table.add_row(method, *(f"{r.psnr_raw:.2f} / {r.psnr:.2f} / {r.ssim:.3f}" for r in rows))
-        Console().print(table)
+        Console(markup=False).print(table)

@@ -83,4 +83,4 @@ def experiment(
     report = run_experiment(output, config, partial(progress_bar, quiet=quiet), workers=workers)
     if not quiet:
         rows = json.loads((output / "results.json").read_text(encoding="utf-8"))
-        Console(stderr=True).print(f"{report}: {len(rows)} rows")
+        Console(stderr=True, markup=False).print(f"{report}: {len(rows)} rows", soft_wrap=True)

@@ -59,7 +59,7 @@ def inspect(
             row += [f"{c.reference_mean:.4g}", f"{c.distance:.3f}"]
             row.append("" if math.isnan(c.yardstick) else f"{c.ratio:.1f}x")
         table.add_row(*row)
-    Console().print(table)
+    Console(markup=False).print(table)
     if out is not None:
         try:
             out.mkdir(parents=True, exist_ok=True)

@@ -50,7 +50,7 @@ class Bar:
 def progress_bar(label: str, unit: str, *, quiet: bool) -> Iterator[Bar]:
     """Yields progress(done, total), both in `unit`s, for a `with` block; the bar appears at the first."""
     columns = (
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
         _Rate(unit),

@@ -80,7 +80,7 @@ def testset(
     if source == "from-bursts":
         with progress_bar("bursts", "bursts", quiet=quiet) as progress:
             _, found = burst_testset(folders[0], output, camera=camera, frames=frames, progress=progress)
-        Console().print(_table(found))
+        Console(markup=False).print(_table(found))
         return
     isos = iso if iso or lux else DEFAULT_ISOS
     with progress_bar("photographs", "photographs", quiet=quiet) as progress:

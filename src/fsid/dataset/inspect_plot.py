@@ -22,9 +22,9 @@ def plot_inspection(path: Path, inspection: Inspection) -> None:
     rows = -(-len(TITLES) // _COLUMNS)
     figure = Figure(figsize=(4.2 * _COLUMNS, 2.8 * rows), layout="constrained")
     for axes, (name, title) in zip(figure.subplots(rows, _COLUMNS).flat, TITLES.items(), strict=False):
-        sets = {Path(inspection.data).name: inspection.values[name]}
+        sets = {as_label(_name(inspection.data)): inspection.values[name]}
         if inspection.reference is not None:
-            sets[f"{Path(inspection.reference_name).name} (reference)"] = inspection.reference[name]
+            sets[as_label(f"{_name(inspection.reference_name)} (reference)")] = inspection.reference[name]
         both = np.concatenate(list(sets.values()))
         low, high = (float(q) for q in np.quantile(both, (0.002, 0.998)))
         edges = np.linspace(low, high if high > low else low + 1.0, _BINS + 1)
@@ -39,3 +39,13 @@ def plot_inspection(path: Path, inspection: Inspection) -> None:
     data = io.BytesIO()
     figure.savefig(data, format="png", dpi=90)
     write_atomically(path, data.getvalue())
+
+
+def as_label(name: str) -> str:
+    """`name` as matplotlib shows it literally: no mathematics, and not left out of a legend."""
+    literal = name.replace("$", r"\$")
+    return f" {literal}" if name.startswith("_") else literal
+
+
+def _name(folder: str) -> str:
+    return Path(folder).resolve().name

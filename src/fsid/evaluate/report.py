@@ -16,6 +16,7 @@ from PIL import Image
 
 from fsid import __version__
 from fsid.dataset import to_uint8
+from fsid.dataset.inspect_plot import as_label
 from fsid.evaluate.classical import bm3d_installed
 from fsid.evaluate.compare import Comparison, Crops, Row, confidence
 from fsid.evaluate.testset import ALL_SETS
@@ -149,10 +150,10 @@ def _cell(comparison: Comparison, row: Row) -> str:
 def _level_plot(comparison: Comparison, set_name: str) -> Picture:
     figure = Figure(figsize=(7, 3.2))
     axes = figure.subplots(1, 2)
-    levels = comparison.testset.levels
+    levels = [as_label(level) for level in comparison.testset.levels]
     for method in dict.fromkeys(row.model for row in comparison.rows):
         cells = [row for row in comparison.rows if (row.model, row.set) == (method, set_name)]
-        axes[0].plot(levels, [row.psnr_raw for row in cells], "o-", label=method_label(method))
+        axes[0].plot(levels, [row.psnr_raw for row in cells], "o-", label=as_label(method_label(method)))
         axes[1].plot(levels, [row.ssim for row in cells], "o-")
     axes[0].set_ylabel("PSNR in RAW (dB)")
     axes[1].set_ylabel("SSIM after develop")
