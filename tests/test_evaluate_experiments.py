@@ -54,6 +54,7 @@ def test_synthetic_against_real_goes_on_where_it_was_stopped(photos: Path, tmp_p
     assert set(rows[0]) == {"model", "training", "camera", "level", "set", "n", "psnr_raw", "psnr", "ssim"}
     models = {row["model"] for row in rows}
     assert models == {"noisy", "classical", "photographs-seed3", "full-seed3", "dead-leaves-seed3"}
+    assert {r["training"] for r in rows if r["model"] == "photographs-seed3"} == {"3 pairs from photographs"}
     assert {"0.5lux", "5lux", "iso800", "iso6400"} <= {row["level"] for row in rows}
     assert "full - photographs" in (out / "report.html").read_text()
 
@@ -87,13 +88,25 @@ def test_folders_and_cameras_are_taken_as_named(photos: Path, tmp_path: Path):
         (["ablation", "--photos", "."], "only real-vs-synthetic"),
         (["ablation", "--seeds", "1", "1"], "give different ones"),
         (["real-vs-synthetic", "--photos", ".", "--test", "."], "test on other photographs"),
+        (["ablation", "--camera", "nosuch"], "profile 'nosuch'"),
+        (["ablation", "--network", "nosuch"], "nosuch: cannot be read"),
+        (["ablation", "--set", "nokey=1"], "no such key: nokey"),
+        (["ablation", "--width", "101"], "width: 101"),
+        (["real-vs-synthetic", "--photos", "."], "holds no picture"),
+        (["ablation", "--test", "."], "holds no photograph"),
+        (["ablation", "--test", "a/val", "b/val"], "another test set is called val"),
+        (["ablation", "--test", "materials"], "another test set is called materials"),
     ],
 )
-def test_bad_input_is_one_line(tmp_path: Path, arguments: list[str], words: str, capsys):
+def test_bad_input_is_one_line(tmp_path: Path, arguments: list[str], words: str, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    for folder in ("a/val", "b/val", "materials"):
+        (tmp_path / folder).mkdir(parents=True)
     with pytest.raises(SystemExit) as stop:
         main(["experiment", *arguments, "-o", str(tmp_path / "out"), "--quiet"])
     assert stop.value.code == 2
     assert words in " ".join(capsys.readouterr().err.split())
+    assert not (tmp_path / "out").exists()
 
 
 def test_the_slider_of_a_report_moves_in_a_browser(photos: Path, tmp_path: Path):

@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import Literal
 
 from fsid.config import Override, from_plain, load_settings, read_yaml, save_settings, to_plain
-from fsid.dataset import GenerateConfig, find_pictures, generate
-from fsid.denoise import train, train_config
+from fsid.dataset import GenerateConfig, find_photos, find_pictures, generate
+from fsid.denoise import TrainConfig, train, train_config
 from fsid.errors import FsidError
 from fsid.evaluate.compare import (
     CLASSICAL,
@@ -35,9 +35,10 @@ from fsid.evaluate.compare import (
 from fsid.evaluate.dead_leaves import write_dead_leaves
 from fsid.evaluate.experiment_report import write_experiment_report
 from fsid.evaluate.models import model_method
-from fsid.evaluate.simulated import simulated_testset
-from fsid.evaluate.testset import photo_testset, read_testset
+from fsid.evaluate.simulated import LUXES, simulated_testset
+from fsid.evaluate.testset import ALL_SETS, levels_of, photo_testset, read_testset
 from fsid.scene import VARIANTS
+from fsid.sensor import load_bayer_profile
 
 Kind = Literal["ablation", "real-vs-synthetic"]
 ProgressBar = Callable[[str, str], AbstractContextManager[Callable[[int, int], None]]]
@@ -47,6 +48,7 @@ SOURCES: dict[Kind, tuple[str, ...]] = {
     "ablation": VARIANTS,
     "real-vs-synthetic": (PHOTOGRAPHS, SCENES, DEAD_LEAVES),
 }
+MATERIALS_SET = "materials"
 TEST_ISOS = (800, 1600, 3200, 6400)
 
 
@@ -87,6 +89,10 @@ class ExperimentConfig:
             raise FsidError(f"--seeds {' '.join(map(str, self.seeds))}: must be at least 0 and below 2^64")
         if self.kind == "real-vs-synthetic" and not self.photos:
             raise FsidError("--photos: name the folder of photographs that the real rival is trained on")
+        names = [MATERIALS_SET, ALL_SETS, *(_set_name(folder) for folder in self.tests)]
+        for folder, name in zip(self.tests, names[2:], strict=True):
+            if names.count(name) > 1:
+                raise FsidError(f"--test {folder}: another test set is called {name}, too; rename the folder")
 
 
 def scale_config(kind: Kind, scale: str) -> ExperimentConfig:
@@ -118,6 +124,7 @@ def experiment(out: Path, config: ExperimentConfig, bar: ProgressBar, *, workers
     Writes results.json (the rows of all test sets), images.csv and report.html. bar(label, unit): a context
     manager that yields progress(done, total).
     """
+    _check(out, config)
     _claim(out, config)
     testsets = _testsets(out, config, bar)
     rows, images = _measured(out / "baselines", [NOISY, CLASSICAL], testsets, bar)
@@ -126,20 +133,31 @@ def experiment(out: Path, config: ExperimentConfig, bar: ProgressBar, *, workers
         for seed in config.seeds:
             name = f"{source}-seed{seed}"
             run = out / "runs" / name
-            settings = [f"seed={seed}", *config.train_settings]
-            if config.steps:
-                settings.append(f"steps={config.steps}")
             if not (out / "measured" / f"{name}.csv").exists():
                 with bar(f"training {name}", "steps") as progress:
-                    train(data, run, train_config(config.network, settings), progress=progress)
+                    train(data, run, _training(config, seed), progress=progress)
             trained = model_method(run, name)
-            method = Method(name, f"{config.count} pairs from {source}", trained.denoise)
+            method = Method(name, f"{_count(config, source)} pairs from {source}", trained.denoise)
             new_rows, new_images = _measured(out / "measured" / name, [method], testsets, bar)
             rows += new_rows
             images += new_images
     write_results(rows, out / "results.json")
     write_images(images, out / "images.csv")
     return write_experiment_report(out / "report.html", config, SOURCES[config.kind], rows, images)
+
+
+def _check(out: Path, config: ExperimentConfig) -> None:
+    """Refuse before anything is written what would stop the experiment on its way.
+
+    Its folder is taken once it has begun: the corrected command would be another experiment.
+    """
+    levels_of(load_bayer_profile(config.camera), TEST_ISOS, LUXES)
+    _training(config, config.seeds[0])
+    for source in SOURCES[config.kind]:
+        _generator(out, config, source)
+        _count(config, source)
+    for folder in config.tests:
+        find_photos(Path(folder))
 
 
 def _claim(out: Path, config: ExperimentConfig) -> None:
@@ -158,10 +176,19 @@ def _claim(out: Path, config: ExperimentConfig) -> None:
         raise FsidError(f"{out}: holds another experiment; these differ: {keys}. Use another folder")
 
 
-def _data(out: Path, config: ExperimentConfig, source: str, bar: ProgressBar, workers: int) -> Path:
-    """The training pairs of a source."""
-    data = out / "data" / source
-    seed, count = config.seeds[0], config.count
+def _training(config: ExperimentConfig, seed: int) -> TrainConfig:
+    steps = [f"steps={config.steps}"] if config.steps else []
+    return train_config(config.network, [f"seed={seed}", *config.train_settings, *steps])
+
+
+def _count(config: ExperimentConfig, source: str) -> int:
+    """How many pairs of a source there are to be: of photographs, at least one of each."""
+    if source != PHOTOGRAPHS:
+        return config.count
+    return max(config.count, len(find_pictures(Path(config.photos))))
+
+
+def _generator(out: Path, config: ExperimentConfig, source: str) -> GenerateConfig:
     overrides: list[Override] = [
         ("width", config.width),
         ("height", config.height),
@@ -169,18 +196,23 @@ def _data(out: Path, config: ExperimentConfig, source: str, bar: ProgressBar, wo
     ]
     if source in VARIANTS:
         overrides += [("variant", source), *config.settings]
-    elif source == PHOTOGRAPHS:
-        photos = Path(config.photos).resolve()
-        overrides.append(("images", str(photos)))
-        count = max(count, len(find_pictures(photos)))
     else:
+        pictures = Path(config.photos) if source == PHOTOGRAPHS else out / "dead-leaves"
+        overrides.append(("images", str(pictures.resolve())))
+    return load_settings(GenerateConfig, None, overrides)
+
+
+def _data(out: Path, config: ExperimentConfig, source: str, bar: ProgressBar, workers: int) -> Path:
+    """The training pairs of a source."""
+    data = out / "data" / source
+    seed, count = config.seeds[0], _count(config, source)
+    settings = _generator(out, config, source)
+    if source == DEAD_LEAVES:
         pictures = out / "dead-leaves"
         with bar("drawing dead leaves", "pictures") as progress:
             write_dead_leaves(
                 pictures, count, height=config.height, width=config.width, seed=seed, progress=progress
             )
-        overrides.append(("images", str(pictures.resolve())))
-    settings = load_settings(GenerateConfig, None, overrides)
     with bar(f"pairs from {source}", "pairs") as progress:
         generate(data, settings, count=count, seed=seed, workers=workers, progress=progress)
     return data
@@ -189,7 +221,7 @@ def _data(out: Path, config: ExperimentConfig, source: str, bar: ProgressBar, wo
 def _testsets(out: Path, config: ExperimentConfig, bar: ProgressBar) -> list[Path]:
     """The simulated materials in lux, and every folder of photographs at TEST_ISOS."""
     root = out / "testsets"
-    found = [root / "materials"]
+    found = [root / MATERIALS_SET]
     if not (found[0] / "testset.json").exists():
         with bar("drawing test materials", "pictures") as progress:
             simulated_testset(
@@ -202,12 +234,16 @@ def _testsets(out: Path, config: ExperimentConfig, bar: ProgressBar) -> list[Pat
                 progress=progress,
             )
     for folder in config.tests:
-        path = root / Path(folder).resolve().name
+        path = root / _set_name(folder)
         found.append(path)
         if not (path / "testset.json").exists():
             with bar(f"test set {path.name}", "photographs") as progress:
                 photo_testset([Path(folder)], path, camera=config.camera, isos=TEST_ISOS, progress=progress)
     return found
+
+
+def _set_name(folder: str) -> str:
+    return Path(folder).resolve().name
 
 
 def _measured(
