@@ -15,8 +15,10 @@ import pytest
 from fsid.cli.main import main
 from fsid.cli.progress import progress_bar
 from fsid.config import read_yaml
+from fsid.evaluate.claim import claim
 from fsid.evaluate.compare import ImageRow
 from fsid.evaluate.dead_leaves import RADIUS_PX, dead_leaves_rand
+from fsid.evaluate.demo import DemoConfig
 from fsid.evaluate.experiment_report import gaps
 from fsid.evaluate.experiments import PHOTOGRAPHS, _data, scale_config
 from fsid.sensor import load_profile, save_profile
@@ -68,6 +70,14 @@ def test_synthetic_against_real_goes_on_where_it_was_stopped(photos: Path, tmp_p
     with pytest.raises(SystemExit) as stop:
         main([*command, "--count", "3"])
     assert stop.value.code == 2
+
+
+def test_a_demo_is_gone_on_with_by_the_same_command_alone(tmp_path: Path, capsys):
+    claim(tmp_path, DemoConfig(photographs=1), "demo")
+    with pytest.raises(SystemExit) as stop:
+        main(["demo", "-o", str(tmp_path), "--photographs", "2", "--scenes", "3", "--quiet"])
+    assert stop.value.code == 2
+    assert "these differ: scenes, photographs" in " ".join(capsys.readouterr().err.split())
 
 
 def test_folders_and_cameras_are_taken_as_named(photos: Path, tmp_path: Path):

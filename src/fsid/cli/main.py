@@ -48,7 +48,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
 }
 
 DESCRIPTION = "RAW denoisers trained on nothing but rendered scenes: generate pairs, train, denoise, prove."
-RESUMABLE = {"generate", "train", "experiment"}
+RESUMABLE = {"generate", "train", "experiment", "demo"}
 EXTRAS = {
     "torch": "train",
     "accelerate": "train",

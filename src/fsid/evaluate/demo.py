@@ -33,6 +33,7 @@ from fsid.dataset import (
 )
 from fsid.denoise import TrainConfig, load_history, train, train_config
 from fsid.errors import FsidError
+from fsid.evaluate.claim import claim
 from fsid.evaluate.compare import (
     CLASSICAL,
     NOISY,
@@ -88,12 +89,17 @@ def demo(out: Path, config: DemoConfig, bar: ProgressBar) -> Path:
     """
     if not 1 <= config.photographs <= len(PHOTOGRAPHS):
         raise FsidError(f"--photographs {config.photographs}: there are 1 to {len(PHOTOGRAPHS)}")
+    if config.scenes < 1 or config.seed < 0:
+        raise FsidError(
+            f"--scenes {config.scenes} --seed {config.seed}: at least 1 scene, and no negative seed"
+        )
     data, run, testset = out / "data", out / "run", out / "testset"
-    generated = GenerateConfig(width=config.width, height=config.height)
+    generated, training = GenerateConfig(width=config.width, height=config.height), _training(config)
+    claim(out, config, "demo")
     with bar("rendering scenes", "pairs") as progress:
         generate(data, generated, count=config.scenes, seed=config.seed, shard_size=8, progress=progress)
     with bar("training on them", "steps") as progress:
-        train(data, run, _training(config), progress=progress)
+        train(data, run, training, progress=progress)
     ours = model_method(run, "ours")
     if not (testset / "testset.json").exists():
         photographs = _copy_photographs(out / "photographs", config.photographs)

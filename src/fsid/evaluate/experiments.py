@@ -17,10 +17,11 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Literal
 
-from fsid.config import Override, from_plain, load_settings, read_yaml, save_settings, to_plain
+from fsid.config import Override, load_settings
 from fsid.dataset import GenerateConfig, find_photos, find_pictures, generate
 from fsid.denoise import TrainConfig, train, train_config
 from fsid.errors import FsidError
+from fsid.evaluate.claim import claim
 from fsid.evaluate.compare import (
     CLASSICAL,
     NOISY,
@@ -125,7 +126,7 @@ def experiment(out: Path, config: ExperimentConfig, bar: ProgressBar, *, workers
     manager that yields progress(done, total).
     """
     _check(out, config)
-    _claim(out, config)
+    claim(out, config, "experiment")
     testsets = _testsets(out, config, bar)
     rows, images = _measured(out / "baselines", [NOISY, CLASSICAL], testsets, bar)
     for source in SOURCES[config.kind]:
@@ -158,22 +159,6 @@ def _check(out: Path, config: ExperimentConfig) -> None:
         _count(config, source)
     for folder in config.tests:
         find_photos(Path(folder))
-
-
-def _claim(out: Path, config: ExperimentConfig) -> None:
-    """Refuse a folder that holds another experiment."""
-    file = out / "experiment.yaml"
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        if not file.exists():
-            save_settings(config, file)
-    except OSError as error:
-        raise FsidError(f"{out}: cannot be written ({error.strerror})") from None
-    there = from_plain(ExperimentConfig, read_yaml(file), source=str(file))
-    if there != config:
-        plain, ours = to_plain(there), to_plain(config)
-        keys = ", ".join(key for key in ours if plain[key] != ours[key])
-        raise FsidError(f"{out}: holds another experiment; these differ: {keys}. Use another folder")
 
 
 def _training(config: ExperimentConfig, seed: int) -> TrainConfig:
