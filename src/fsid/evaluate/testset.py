@@ -12,6 +12,7 @@ A level is a name such as "iso3200"; the noise level of each capture is in its D
 from __future__ import annotations
 
 import json
+import os
 import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -37,6 +38,8 @@ from fsid.sensor import (
 
 Progress = Callable[[int, int], None]
 
+_STEM = 60
+"""Letters of a photograph's name in that of its folder: a file system takes 255 bytes."""
 ALL_SETS = "all"
 """The name in results of all sets together."""
 
@@ -127,7 +130,10 @@ def photo_testset(
     testset = TestSet(
         camera=profile.name,
         levels=tuple(levels),
-        images=tuple(TestImage(f"{i:04d}-{path.stem}", name) for i, (name, path) in enumerate(photos)),
+        images=tuple(
+            TestImage(f"{i:04d}-{as_text(path.stem)[:_STEM]}", as_text(name))
+            for i, (name, path) in enumerate(photos)
+        ),
         seed=seed,
         notes="photographs unprocessed to RAW (Brooks et al. 2019), noise from the camera's profile",
     )
@@ -139,6 +145,11 @@ def photo_testset(
     return testset
 
 
+def as_text(name: str) -> str:
+    """A file's name in Unicode: what is no text in it is replaced."""
+    return os.fsencode(name).decode(errors="replace")
+
+
 class Setting(NamedTuple):
     """What the camera is set to at a level; the exposure time matters for dark current only."""
 
@@ -148,8 +159,8 @@ class Setting(NamedTuple):
 
 def levels_of(profile: CameraProfile, isos: Sequence[int], luxes: Sequence[float]) -> dict[str, Setting]:
     """The camera's setting at every level by name; FsidError where there is none or one is not positive."""
-    if not (isos or luxes) or min((*isos, *luxes)) <= 0:
-        raise FsidError("--iso: at least one positive ISO (or --lux) is needed")
+    if not (isos or luxes) or not all(0 < level < np.inf for level in (*isos, *luxes)):
+        raise FsidError("--iso: at least one positive ISO (or --lux) is needed, and no infinite one")
     levels = {f"iso{iso}": Setting(float(iso), 0.0) for iso in isos}
     for lux in luxes:
         light = light_level(profile, lux, highest_iso=np.inf)
