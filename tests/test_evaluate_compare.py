@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
 import shutil
 from html.parser import HTMLParser
 from pathlib import Path
@@ -15,6 +16,7 @@ import rawpy
 from fsid.cli.main import main
 from fsid.errors import FsidError
 from fsid.evaluate import CLASSICAL, NOISY, Method, compare, photo_testset, psnr, read_testset, write_results
+from fsid.evaluate.compare import Row, confidence
 from fsid.evaluate.models import model_names
 from fsid.evaluate.report import comparison_sections, write_report
 from fsid.sensor import read_raw
@@ -125,6 +127,38 @@ def test_names_are_text_and_nothing_else(small_set: Path, tmp_path: Path, capsys
     page = (tmp_path / "r.html").read_text()
     assert "[/b] &lt;i&gt;[red]" in page
     assert "<i>" not in page
+
+
+def test_equal_images_leave_valid_json(tmp_path: Path):
+    row = Row("m", "", "c", "iso50", "s", 2, float("inf"), 40.0, 1.0)
+    write_results([row], tmp_path / "results.json")
+    (written,) = json.loads((tmp_path / "results.json").read_text(), parse_constant=pytest.fail)
+    assert (written["psnr_raw"], written["psnr"]) == (None, 40.0)
+    assert np.isnan(confidence([float("inf"), 40.0]))
+
+
+def test_an_image_with_nan_is_not_perfect():
+    image = np.full((16, 16), 0.5, np.float32)
+    assert np.isnan(psnr(np.full_like(image, np.nan), image))
+    assert psnr(image, image) == float("inf")
+
+
+def test_photographs_may_have_long_names_and_such_that_are_no_text(photos: Path, tmp_path: Path):
+    (tmp_path / "photos").mkdir()
+    names = ["é" * 120 + ".png", os.fsdecode(b"\xff.png")]
+    try:
+        for name in names:
+            shutil.copy(min(photos.iterdir()), tmp_path / "photos" / name)
+    except OSError:
+        pytest.skip("this file system takes names in UTF-8 alone")
+    photo_testset([tmp_path / "photos"], tmp_path / "set", camera="pixel6", isos=[800])
+    assert len(compare(tmp_path / "set", [NOISY]).images) == 2
+
+
+@pytest.mark.parametrize("lux", [float("inf"), float("nan"), 0.0])
+def test_light_that_no_scene_has_is_refused(photos: Path, tmp_path: Path, lux: float):
+    with pytest.raises(FsidError, match="--lux"):
+        photo_testset([photos], tmp_path / "set", camera="pixel6", isos=[], luxes=[lux])
 
 
 def test_models_are_told_apart_by_name(tmp_path: Path, monkeypatch):

@@ -150,12 +150,15 @@ def detailed_window(srgb: np.ndarray, size_px: int) -> tuple[tuple[slice, slice]
 
 
 def write_results(rows: Sequence[Row], file: Path) -> None:
-    """Write results.json: a list of rows, figures rounded to 1e-4."""
-    plain = [
-        {key: round(value, 4) if isinstance(value, float) else value for key, value in asdict(row).items()}
-        for row in rows
-    ]
-    file.write_text(json.dumps(plain, indent=1) + "\n", encoding="utf-8")
+    """Write results.json: a list of rows, figures rounded to 1e-4; null for the PSNR of equal images."""
+
+    def plain(value: object) -> object:
+        if not isinstance(value, float):
+            return value
+        return round(value, 4) if np.isfinite(value) else None
+
+    plain_rows = [{key: plain(value) for key, value in asdict(row).items()} for row in rows]
+    file.write_text(json.dumps(plain_rows, indent=1, allow_nan=False) + "\n", encoding="utf-8")
 
 
 def write_images(images: Sequence[ImageRow], file: Path) -> None:
@@ -168,8 +171,11 @@ def write_images(images: Sequence[ImageRow], file: Path) -> None:
 
 
 def confidence(values: Sequence[float]) -> float:
-    """Half width of the 95 % confidence interval of the mean (Student's t); NaN of fewer than two values."""
-    if len(values) < 2:
+    """Half width of the 95 % confidence interval of the mean (Student's t).
+
+    NaN of fewer than two values, or where one is infinite.
+    """
+    if len(values) < 2 or not np.isfinite(values).all():
         return float("nan")
     return float(stdtrit(len(values) - 1, 0.975) * np.std(values, ddof=1) / np.sqrt(len(values)))
 

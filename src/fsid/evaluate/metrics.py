@@ -12,9 +12,9 @@ from skimage.metrics import structural_similarity
 
 
 def psnr(image: np.ndarray, truth: np.ndarray) -> float:
-    """Peak signal-to-noise ratio in dB of two arrays of equal shape, range 0..1; inf where equal."""
+    """Peak signal-to-noise ratio in dB of two arrays of equal shape, 0..1; inf where equal, NaN of NaN."""
     error = np.mean(np.square(np.clip(image, 0, 1) - np.clip(truth, 0, 1), dtype=np.float64))
-    return float(-10.0 * np.log10(error)) if error > 0 else float("inf")
+    return float(-10.0 * np.log10(error)) if error != 0 else float("inf")
 
 
 def ssim(image: np.ndarray, truth: np.ndarray) -> float:

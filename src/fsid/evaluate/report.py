@@ -143,7 +143,8 @@ def _cell(comparison: Comparison, row: Row) -> str:
         for image in comparison.images
         if (image.model, image.level) == (row.model, row.level) and row.set in (image.set, ALL_SETS)
     ]
-    interval = f" ± {confidence(values):.2f}" if len(values) > 1 else ""
+    half = confidence(values)
+    interval = f" ± {half:.2f}" if np.isfinite(half) else ""
     return f"{row.psnr_raw:.2f}{interval} / {row.psnr:.2f} / {row.ssim:.3f}"
 
 
