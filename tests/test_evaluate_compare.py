@@ -161,6 +161,21 @@ def test_light_that_no_scene_has_is_refused(photos: Path, tmp_path: Path, lux: f
         photo_testset([photos], tmp_path / "set", camera="pixel6", isos=[], luxes=[lux])
 
 
+def test_a_narrow_table_loses_no_level(small_set: Path, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "24")
+    main(["evaluate", str(small_set), "--quiet"])
+    assert "…" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("option", ["photos --frames 3", "photos --material fabric", "from-bursts --iso 800"])
+def test_options_without_effect_are_refused(photos: Path, tmp_path: Path, option: str, capsys):
+    source, name, value = option.split()
+    with pytest.raises(SystemExit) as stop:
+        main(["testset", source, str(photos), name, value, "-o", str(tmp_path / "set"), "--quiet"])
+    assert stop.value.code == 2
+    assert f"{name}: fsid testset {source} has no use" in " ".join(capsys.readouterr().err.split())
+
+
 def test_models_are_told_apart_by_name(tmp_path: Path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for run in ("lr-0.1", "lr-0.2", "b/lr-0.2"):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from rich.console import Console
-from rich.table import Table
+from rich.table import Column, Table
 from tyro.conf import Positional, UseAppendAction
 
 from fsid.cli.arguments import OptionalOutput
@@ -35,7 +35,8 @@ def evaluate(
     with progress_bar("measuring", "captures", quiet=quiet) as progress:
         comparison = evaluate_models(testset, model, output, progress=progress)
     for name in dict.fromkeys(row.set for row in comparison.rows):
-        table = Table("model", *comparison.testset.levels, title=f"{name}: PSNR raw / PSNR / SSIM")
+        heads = (Column(head, overflow="fold") for head in ("model", *comparison.testset.levels))
+        table = Table(*heads, title=f"{name}: PSNR raw / PSNR / SSIM")
         for method in dict.fromkeys(row.model for row in comparison.rows):
             rows = [row for row in comparison.rows if (row.set, row.model) == (name, method)]
             table.add_row(method, *(f"{r.psnr_raw:.2f} / {r.psnr:.2f} / {r.ssim:.3f}" for r in rows))

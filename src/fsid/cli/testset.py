@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from rich.console import Console
-from rich.table import Table
+from rich.table import Column, Table
 from tyro.conf import Positional
 
 from fsid.cli.arguments import Output
@@ -61,6 +61,7 @@ def testset(
     from fsid.evaluate import burst_testset, photo_testset, simulated_testset
 
     _check_folders(source, folders)
+    _check_options(source, {"--iso": iso, "--lux": lux, "--material": material, "--frames": frames != 1})
     if source == "simulate":
         with progress_bar("materials", "pictures", quiet=quiet) as progress:
             simulated_testset(
@@ -98,9 +99,25 @@ def _check_folders(source: str, folders: tuple[Path, ...]) -> None:
         raise FsidError("fsid testset from-bursts: give one folder, <scene>/<level>/frames inside")
 
 
+def _check_options(source: str, given: dict[str, object]) -> None:
+    """Refuse what would do nothing: a set that looks right would lack it."""
+    without = {"photos": ("--material", "--frames"), "from-bursts": ("--iso", "--lux", "--material")}
+    for option in without.get(source, ()):
+        if given[option]:
+            raise FsidError(f"{option}: fsid testset {source} has no use for it; leave it out")
+
+
 def _table(found: Sequence[TruthQuality]) -> Table:
     """How good the truths are, a row per burst."""
-    table = Table("burst", "frames", "left out", "outliers", "flicker", "shift px", "truth PSNR dB")
+    table = Table(
+        Column("burst", overflow="fold"),
+        "frames",
+        "left out",
+        "outliers",
+        "flicker",
+        "shift px",
+        "truth PSNR dB",
+    )
     for q in found:
         table.add_row(
             f"{q.image}/{q.level}",
