@@ -19,7 +19,7 @@ from io import BytesIO
 from pathlib import Path
 
 import numpy as np
-from PIL import Image
+from PIL import Image, UnidentifiedImageError
 
 MAX_FILE_BYTES = 128 * 2**20
 MAX_PIXELS = 8192 * 8192
@@ -159,6 +159,8 @@ def decode_image(data: bytes, name: str, size: int) -> np.ndarray:
         if image.mode.startswith("I"):
             return np.asarray(image, dtype=np.float32)[..., None] / np.float32(65535)
         pixels = np.asarray(image.convert("L" if image.mode in ("1", "L", "LA") else "RGB"))
+    except UnidentifiedImageError:
+        raise RefusedImageError(f"{name} is no readable JPEG or PNG") from None
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError, MemoryError) as error:
         raise RefusedImageError(f"{name} is no readable JPEG or PNG ({error})") from None
     return np.atleast_3d(pixels).astype(np.float32) / np.float32(255)

@@ -31,6 +31,7 @@ _TILES, _TILE_PX = 12, 240
 _FAMILIES_SHOWN = 200
 _MEASURED = 64
 """Images whose statistics the card states; `fsid inspect` measures more."""
+_SMALLEST_PX = 128
 
 
 @dataclass
@@ -129,10 +130,10 @@ def _sources(tally: _Tally) -> Iterable[str]:
 
 def _statistics(out: Path) -> Iterable[str]:
     """Means of what `fsid inspect` measures; nothing where an image is too small for it."""
-    from fsid.dataset.inspect import SMALLEST_PX, inspect  # with libraries that a worker never needs
+    from fsid.dataset.inspect import inspect  # with libraries that a worker never needs
     from fsid.dataset.statistics import TITLES
 
-    if min(min(mosaic.height, mosaic.width) for mosaic in index_mosaics(out)) < SMALLEST_PX:
+    if min(min(mosaic.height, mosaic.width) for mosaic in index_mosaics(out)) < _SMALLEST_PX:
         return
     found = inspect(out, limit=_MEASURED)
     yield from ("", "## Statistics", "", f"Means over {found.pictures} of the clean images (`fsid inspect`).")

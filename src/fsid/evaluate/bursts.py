@@ -133,14 +133,13 @@ def average(
         )
     window = _common_window(placed, first)
     mean, variance = _moments(placed, window)
-    sigma = np.sqrt(_spread_over_site(variance, first.cfa))
     total, used = np.zeros(mean.shape), np.zeros(mean.shape)
     for x in _frames(placed, window):
-        kept = np.abs(x - mean) <= OUTLIER_SIGMA * sigma + 1e-9
+        kept = _is_like_the_others(x - mean, variance, len(placed), first.cfa)
         total += np.where(kept, x, 0)
         used += kept
     truth = np.where(used > 0, total / np.maximum(used, 1), mean).astype(np.float32)
-    error = float(np.sqrt(np.mean(sigma.astype(np.float64) ** 2) / len(placed)))
+    error = float(np.sqrt(np.mean(variance, dtype=np.float64) / len(placed)))
     quality = TruthQuality(
         image=image,
         level=level,
@@ -259,6 +258,15 @@ def _moments(placed: Sequence[_Placed], window: Window) -> tuple[np.ndarray, np.
         mean = mean + delta / count
         square = square + delta * (x - mean)
     return mean, square / (len(placed) - 1)
+
+
+def _is_like_the_others(deviation: np.ndarray, variance: np.ndarray, frames: int, cfa: str) -> np.ndarray:
+    """Whether a frame, by its deviation from the mean of all, lies where the others do: within OUTLIER_SIGMA
+    of their mean, by their spread, since in a short burst an outlier widens that of all beyond itself."""
+    share = frames / (frames - 1)
+    others = ((frames - 1) * variance - share * deviation**2) / (frames - 2)
+    limit = OUTLIER_SIGMA * np.sqrt(_spread_over_site(others, cfa))
+    return np.asarray(np.sqrt(share) * np.abs(deviation) <= limit + 1e-9)
 
 
 def _spread_over_site(variance: np.ndarray, cfa: str) -> np.ndarray:

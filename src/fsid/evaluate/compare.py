@@ -108,7 +108,7 @@ def compare(
         truth = read_raw(testset.clean(root, image, level))
         developed_truth = develop(truth)
         frames = [_noisy(testset.noisy(root, image, level, n), truth) for n in range(testset.frames)]
-        outputs = {}
+        outputs, shown_psnr = {}, {}
         for method in methods:
             results = [method.denoise(frame) for frame in frames]
             developed = [develop(result) for result in results]
@@ -117,12 +117,12 @@ def compare(
                 (psnr(r.mosaic, truth.mosaic), psnr(d, developed_truth), ssim(d, developed_truth))
                 for r, d in zip(results, developed, strict=True)
             ]
+            shown_psnr[method.name] = figures[0][0]
             mean = map(float, np.mean(figures, axis=0))
             images.append(ImageRow(method.name, level, image.set, image.name, *mean))
         if level in crop_levels:
-            raw_psnr = {row.model: row.psnr_raw for row in images[-len(methods) :]}
             turn = truth.metadata.orientation
-            crops.append(_crops(image, level, developed_truth, outputs, raw_psnr, crop_px, turn))
+            crops.append(_crops(image, level, developed_truth, outputs, shown_psnr, crop_px, turn))
     progress(len(tasks), len(tasks))
     return Comparison(testset, tuple(summarise(testset, methods, images)), tuple(images), tuple(crops))
 

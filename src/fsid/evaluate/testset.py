@@ -17,6 +17,7 @@ import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import NamedTuple
 
@@ -104,6 +105,10 @@ def read_testset(root: Path) -> TestSet:
     for name in names:
         if not name or name != Path(name).name:
             raise FsidError(f"{file}: {name!r} is not a plain file name")
+    for image, level, frame in product(testset.images, testset.levels, range(testset.frames)):
+        for capture in (testset.clean(root, image, level), testset.noisy(root, image, level, frame)):
+            if not capture.is_file():
+                raise FsidError(f"{capture}: is missing; {file.name} names it")
     return testset
 
 
@@ -126,7 +131,12 @@ def photo_testset(
     """
     profile = load_bayer_profile(camera)
     levels = levels_of(profile, isos, luxes)
-    photos = [(folder.resolve().name, path) for folder in folders for path in find_photos(folder)]
+    names = [folder.resolve().name for folder in folders]
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise FsidError(f"{twice[0]}: two folders have this name, and it is that of a set; rename one")
+    photos = [
+        (name, path) for name, folder in zip(names, folders, strict=True) for path in find_photos(folder)
+    ]
     testset = TestSet(
         camera=profile.name,
         levels=tuple(levels),
