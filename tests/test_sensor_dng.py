@@ -1,6 +1,7 @@
 """DNG: what is written opens in LibRaw with the same pixels and comes back as the same Raw."""
 
 import io
+import os
 from dataclasses import replace
 
 import numpy as np
@@ -237,6 +238,13 @@ def test_a_missing_file_and_a_folder_are_named(tmp_path):
     for path in (tmp_path / "missing.dng", tmp_path):
         with pytest.raises(FsidError, match=str(path)):
             read_raw(path)
+
+
+def test_a_name_that_is_no_text_is_named(tmp_path):
+    path = tmp_path / os.fsdecode(b"b\xff.dng")
+    write_dng(path, _raw())
+    with pytest.raises(FsidError, match="name is not UTF-8"):
+        read_raw(path)
 
 
 def test_a_truncated_file_is_named(tmp_path):

@@ -122,6 +122,8 @@ def _opened(path: Path) -> Iterator[tuple[rawpy.RawPy, _Source]]:
     except (rawpy.LibRawError, rawpy.NotSupportedError, NotImplementedError) as error:
         reason = error.args[0].decode() if error.args and isinstance(error.args[0], bytes) else error
         raise FsidError(f"{path}: not a RAW file that LibRaw can read ({reason})") from error
+    except UnicodeEncodeError:
+        raise FsidError(f"{path}: LibRaw opens no file whose name is not UTF-8; rename it") from None
 
 
 def _dng_bytes(raw: Raw, preview: np.ndarray | None) -> bytes:
