@@ -11,10 +11,11 @@ from scipy.ndimage import center_of_mass, map_coordinates
 
 from fsid.errors import FsidError
 from fsid.render import Frame, Renderer
-from fsid.render.camera import distorted, lens_of, undistorted
+from fsid.render.camera import lens_of
 from fsid.render.drawable import View
 from fsid.render.flow import flow_between
 from fsid.scene import SceneConfig, sample
+from fsid.scene.distortion import distorted, undistorted
 from fsid.scene.model import Camera, Distortion, Motion, Transform
 from render_scenes import FROM_ABOVE, bake_plain, block, grid, lambertian, point_light, sphere, view
 

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fsid.errors import FsidError
+from fsid.render.camera import lens_of
 from fsid.scene import (
     Camera,
     CameraConfig,
@@ -172,3 +173,15 @@ def test_views_are_low_level_and_high():
             assert np.hypot(x, y) > 1.1
     assert min(elevations) < 12
     assert max(elevations) > 50
+
+
+@pytest.mark.parametrize("fisheye_share", [0.0, 1.0])
+@pytest.mark.parametrize(
+    ("width", "height", "fov_deg"), [(64, 48, 60.0), (320, 192, 149.0), (96, 170, 145.0)]
+)
+def test_every_lens_that_is_drawn_can_be_rendered(width, height, fov_deg, fisheye_share):
+    """Small images reach farther beyond their corner, wide ones look farther aside, than a radius says."""
+    camera = dataclasses.replace(CAMERA, width=width, height=height, fov_deg=fov_deg)
+    config = LensConfig(distortion_share=1.0, distortion=(-0.5, 0.5), fisheye_share=fisheye_share)
+    for seed in range(60):
+        lens_of(lens_rand(np.random.default_rng(seed), config, camera))

@@ -12,9 +12,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fsid.render.camera import Lens, distorted, undistorted
+from fsid.render.camera import Lens
 from fsid.render.drawable import UNMOVED, Drawable
 from fsid.render.frame import Frame
+from fsid.scene.distortion import distorted, undistorted
 from fsid.scene.model import Camera
 
 

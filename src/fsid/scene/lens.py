@@ -16,10 +16,8 @@ import numpy as np
 from fsid.errors import FsidError
 from fsid.scene.camera_config import LensConfig
 from fsid.scene.choice import log_uniform_rand
+from fsid.scene.distortion import MODELS, rays_of
 from fsid.scene.model import Camera, Distortion
-
-MODELS = {"brown-conrady": 5, "fisheye": 4}
-"""Distortion model -> number of its coefficients."""
 
 MAX_FISHEYE_DEG = 80.0
 """Angle from the axis in the corner of the image: beyond 90 degrees a plane has no image point."""
@@ -39,7 +37,6 @@ def lens_rand(rng: np.random.Generator, config: LensConfig, camera: Camera) -> C
         config.fringe_share,
         config.soft_share,
     )
-    corner = corner_radius(camera)
     displacement, second = rng.uniform(*config.distortion), rng.uniform(-0.3, 0.3)
     decentring = rng.normal(0, _DECENTRING, 2)
     bend = rng.normal(0, 0.02, 4)
@@ -53,7 +50,7 @@ def lens_rand(rng: np.random.Generator, config: LensConfig, camera: Camera) -> C
     if fisheye:
         camera = _fisheye(camera, bend)
     elif distorted:
-        camera = replace(camera, distortion=_brown_conrady(corner, displacement, second, decentring))
+        camera = replace(camera, distortion=_brown_conrady(camera, displacement, second, decentring))
     if blurred:
         depth = float(np.linalg.norm(np.subtract(camera.target_m, camera.position_m)))
         camera = replace(camera, aperture_m=aperture_m, focus_m=depth * float(focus))
@@ -110,16 +107,28 @@ def _even(at: np.ndarray, coefficients: tuple[float, ...]) -> np.ndarray:
     return sum((k * at ** (2 * i + 2) for i, k in enumerate(coefficients)), np.zeros_like(at))
 
 
+def _has_rays(distortion: Distortion, camera: Camera) -> bool:
+    """Whether the camera can be rendered with it: beyond the corner by a pixel, and not too wide."""
+    focal = 1.0 / np.tan(np.radians(camera.fov_deg) / 2)
+    try:
+        rays_of(distortion, camera, (float(focal), float(focal * camera.width / camera.height)))
+    except FsidError:
+        return False
+    return True
+
+
 def _brown_conrady(
-    corner: float, displacement: float, second: float, decentring: np.ndarray
+    camera: Camera, displacement: float, second: float, decentring: np.ndarray
 ) -> Distortion | None:
-    """The lens that moves the corner by `displacement` x its radius, weakened until it is invertible."""
+    """The lens that moves the corner by `displacement` x its radius, weakened until it is invertible; None
+    for an image so wide that none is."""
+    corner = corner_radius(camera)
     for strength in (1.0, 0.7, 0.5, 0.3, 0.1):
         k1 = strength * displacement * (1 - second) / corner**2
         k2 = strength * displacement * second / corner**4
         p1, p2 = (float(strength * p / corner) for p in decentring)
         distortion = Distortion("brown-conrady", (float(k1), float(k2), p1, p2, 0.0))
-        if _is_invertible(distortion, corner):
+        if _is_invertible(distortion, corner) and _has_rays(distortion, camera):
             return distortion
     return None
 
@@ -135,6 +144,6 @@ def _fisheye(camera: Camera, bend: np.ndarray) -> Camera:
     for strength in (1.0, 0.5, 0.0):
         k1, k2, k3, k4 = (float(strength * k) for k in bend * (1.0, 0.3, 0.1, 0.03))
         distortion = Distortion("fisheye", (k1, k2, k3, k4))
-        if _is_invertible(distortion, corner):
+        if _is_invertible(distortion, corner) and _has_rays(distortion, camera):
             break
     return replace(camera, distortion=distortion)
