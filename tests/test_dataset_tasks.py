@@ -96,7 +96,7 @@ def green(raw: Raw) -> np.ndarray:
 
 def test_things_that_move_need_scenes(photos: Path) -> None:
     for task in ("deblur", "burst"):
-        with pytest.raises(FsidError, match=f"--task {task}: needs scenes"):
+        with pytest.raises(FsidError, match=f"--task {task}: needs scenes, in which"):
             make_sample(config(f"task={task}", f"images={photos}"), 0, 0, None)
     with pytest.raises(FsidError, match="knows no flow"):
         config("task=burst", "renderer=reference")

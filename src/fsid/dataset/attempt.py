@@ -120,7 +120,7 @@ class Attempt:
         picture = read_picture(paths[number])
         window = _window_rand(self._rng(_SCENE), picture.pixels, config.width, config.height, step=2)
         facts = {"split": split_of(config, number), "image": picture.path.name}
-        if not picture.is_linear and config.task != "denoise":
+        if not picture.is_linear and config.task == "super-resolution":
             raise FsidError(f"--task {config.task}: needs scenes or linear .exr pictures, not photographs")
         return _Source(views_of_light(rng, config, _cut(picture.pixels, window)), facts, picture.is_linear)
 
