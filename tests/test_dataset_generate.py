@@ -15,7 +15,7 @@ import rawpy
 import webdataset
 
 from fsid.config import load_settings, read_yaml
-from fsid.dataset import GenerateConfig, generate, read_member, shard_keys, shard_path
+from fsid.dataset import GenerateConfig, dataset_config, generate, read_member, shard_keys, shard_path
 from fsid.errors import FsidError
 
 SMALL = ["width=128", "height=96"]
@@ -133,6 +133,8 @@ def test_photographs_are_the_same_data_whatever_scenes_would_be(photos: Path, tm
     [
         ("width=127", "width"),
         ("height=0", "height"),
+        ("height=16386", "height"),
+        ("crops=2", "crops"),
         ("variant=all", "variant"),
         ("iso_range=[800, 100]", "iso_range"),
         ("iso_range=[1, .inf]", "iso_range"),
@@ -153,6 +155,29 @@ def test_an_unknown_camera_is_named_before_anything_is_written(tmp_path: Path):
     with pytest.raises(FsidError, match="nokia3310"):
         generate(tmp_path / "out", small("cameras=[nokia3310]"), count=1)
     assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_without_skies_is_named_before_anything_is_written(tmp_path: Path):
+    """Not at the first scene in open air, which may be the thousandth."""
+    skies = tmp_path / "skies"
+    skies.mkdir()
+    with pytest.raises(FsidError, match="holds no panorama"):
+        generate(tmp_path / "out", small(f"scene.hdri_folder={skies}"), count=1)
+    assert not (tmp_path / "out").exists()
+    dataset_config(small(f"scene.hdri_folder={skies}", "scene.background.kind_shares=[1,0,0,0]"), 0)
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        ("crops=2", "crop_width=126"),
+        ("crops=2", "checks.duplicate_bits=-1"),
+        ("crops=2", "task=super-resolution", "scale=4", "crop_height=88"),
+        ("crops=2", "images=pictures"),
+    ],
+)
+def test_crops_may_be_as_many_as_there_are_windows(overrides: tuple[str, ...]):
+    assert small(*overrides).crops == 2
 
 
 def test_a_broken_photograph_is_named_and_leaves_no_shard(tmp_path: Path):

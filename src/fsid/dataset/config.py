@@ -20,6 +20,7 @@ RENDERERS = ("raster", "reference")
 QUALITIES = ("high", "fast")
 _POSITIVE = ("crops", "exposures", "noise_levels", "lens_images")
 _HIGHEST_ISO = 10_000_000
+_LARGEST_PX = 16384
 
 
 @dataclass(frozen=True)
@@ -90,6 +91,8 @@ class GenerateConfig:
             size = getattr(self, key)
             if size < 32 or size % 2:
                 raise FsidError(f"{key}: {size} is not an even number of at least 32 pixels")
+            if size > _LARGEST_PX and not self.images:
+                raise FsidError(f"{key}: scenes are rendered at up to {_LARGEST_PX} pixels, not {size}")
             self._check_crop(f"crop_{key}", size)
         choices = {"variant": VARIANTS, "task": TASKS, "renderer": RENDERERS, "quality": QUALITIES}
         for key, known in choices.items():
@@ -109,6 +112,11 @@ class GenerateConfig:
             raise FsidError(f"validation_every: {self.validation_every} is negative; 0 means no validation")
         if self.scale not in (2, 4):
             raise FsidError(f"scale: {self.scale} is neither 2 nor 4")
+        if self.crops > self._windows and self.checks.duplicate_bits >= 0 and not self.images:
+            raise FsidError(
+                f"crops: {self.crops}, but crop_width and crop_height leave {self._windows} different ones, "
+                "and near-duplicates are refused"
+            )
         if not 1 <= self.supersampling <= 4:
             raise FsidError(f"supersampling: {self.supersampling} is not between 1 and 4")
         if self.texture_size and (not 64 <= self.texture_size <= 4096 or self.texture_size.bit_count() != 1):
@@ -120,6 +128,16 @@ class GenerateConfig:
             raise FsidError(
                 f"{key}: {size} is not 0 or an even number of pixels from 32 to the frame's {frame}"
             )
+
+    @property
+    def _windows(self) -> int:
+        """How many different crops a frame has."""
+        step = 2 * self.scale if self.task == "super-resolution" else 2
+        free = (
+            self.width // step - (self.crop_width or self.width) // step,
+            self.height // step - (self.crop_height or self.height) // step,
+        )
+        return (free[0] + 1) * (free[1] + 1)
 
     @property
     def texture_px(self) -> int:

@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from fsid.assets import sky_sources
 from fsid.config import from_plain, read_yaml, save_settings, to_plain
 from fsid.dataset.card import CARD, write_card
 from fsid.dataset.config import DatasetConfig, GenerateConfig
@@ -138,6 +139,8 @@ def dataset_config(config: GenerateConfig, seed: int, shard_size: int = 0) -> Da
     for folder in (*scene.mesh_folders, *scene.texture_folders, scene.hdri_folder):
         if not Path(folder).exists():
             raise FsidError(f"{folder}: there is no such folder")
+    if scene.hdri_folder and scene.background.kind_shares[-1] and not config.images:
+        sky_sources(scene.hdri_folder)
     pictures = len(find_pictures(Path(config.images))) if config.images else 0
     pairs = config.pairs_per_frame
     shard_size = shard_size or -(-SHARD_SIZE // pairs) * pairs
