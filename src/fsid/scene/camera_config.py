@@ -15,8 +15,8 @@ class CameraConfig:
     """Where the camera stands and how wide it sees."""
 
     distance_m: Range = knob((0.45, 3.0), 0.2, 100.0)
-    """Distance from the focus; log-uniform. At least 1.25 m below 20 degrees of
-    elevation; less where a wall is nearer."""
+    """Distance from the focus; log-uniform. At least 1.25 m below 20 degrees of elevation;
+    less where a wall is nearer."""
     elevation_deg: Range = knob((2.0, 55.0), 0.0, 88.0)
     """Angle above the horizon seen from the focus: low views see walls and horizon, high ones the ground."""
     fov_deg: Range = knob((28.0, 72.0), 5.0, 150.0)
