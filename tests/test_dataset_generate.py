@@ -134,7 +134,6 @@ def test_photographs_are_the_same_data_whatever_scenes_would_be(photos: Path, tm
         ("width=127", "width"),
         ("height=0", "height"),
         ("height=16386", "height"),
-        ("crops=2", "crops"),
         ("variant=all", "variant"),
         ("iso_range=[800, 100]", "iso_range"),
         ("iso_range=[1, .inf]", "iso_range"),
@@ -173,11 +172,16 @@ def test_a_folder_without_skies_is_named_before_anything_is_written(tmp_path: Pa
         ("crops=2", "crop_width=126"),
         ("crops=2", "checks.duplicate_bits=-1"),
         ("crops=2", "task=super-resolution", "scale=4", "crop_height=88"),
-        ("crops=2", "images=pictures"),
     ],
 )
 def test_crops_may_be_as_many_as_there_are_windows(overrides: tuple[str, ...]):
-    assert small(*overrides).crops == 2
+    assert dataset_config(small(*overrides), 0).generate.crops == 2
+
+
+def test_more_crops_than_windows_are_named_before_anything_is_written(tmp_path: Path):
+    with pytest.raises(FsidError, match="crops: 2"):
+        generate(tmp_path / "out", small("crops=2"), count=1)
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_broken_photograph_is_named_and_leaves_no_shard(tmp_path: Path):

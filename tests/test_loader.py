@@ -176,6 +176,13 @@ def test_unusable_datasets_are_named(dataset: Path, tmp_path: Path) -> None:
         index_mosaics(dataset)
 
 
+def test_crops_of_a_frame_are_of_one_scene(tmp_path: Path) -> None:
+    dataset = write_dataset(tmp_path, [raw(np.zeros((HEIGHT, WIDTH)))] * 4)
+    crops = GenerateConfig(crops=2, crop_width=WIDTH, crop_height=HEIGHT)
+    save_settings(DatasetConfig(0, 4, crops), dataset / "config.yaml")
+    assert [mosaic.scene for mosaic in index_mosaics(dataset)] == [0, 0, 1, 1]
+
+
 @pytest.mark.parametrize("key", ["./scene_a_0001", "abc", "../../evil", "9" * 5000])
 def test_a_key_that_is_no_number_is_named(key: str, tmp_path: Path) -> None:
     image = io.BytesIO()

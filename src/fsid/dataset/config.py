@@ -112,11 +112,6 @@ class GenerateConfig:
             raise FsidError(f"validation_every: {self.validation_every} is negative; 0 means no validation")
         if self.scale not in (2, 4):
             raise FsidError(f"scale: {self.scale} is neither 2 nor 4")
-        if self.crops > self._windows and self.checks.duplicate_bits >= 0 and not self.images:
-            raise FsidError(
-                f"crops: {self.crops}, but crop_width and crop_height leave {self._windows} different ones, "
-                "and near-duplicates are refused"
-            )
         if not 1 <= self.supersampling <= 4:
             raise FsidError(f"supersampling: {self.supersampling} is not between 1 and 4")
         if self.texture_size and (not 64 <= self.texture_size <= 4096 or self.texture_size.bit_count() != 1):
@@ -130,7 +125,7 @@ class GenerateConfig:
             )
 
     @property
-    def _windows(self) -> int:
+    def windows(self) -> int:
         """How many different crops a frame has."""
         step = 2 * self.scale if self.task == "super-resolution" else 2
         free = (

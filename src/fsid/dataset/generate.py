@@ -141,6 +141,11 @@ def dataset_config(config: GenerateConfig, seed: int, shard_size: int = 0) -> Da
             raise FsidError(f"{folder}: there is no such folder")
     if scene.hdri_folder and scene.background.kind_shares[-1] and not config.images:
         sky_sources(scene.hdri_folder)
+    if config.crops > config.windows and config.checks.duplicate_bits >= 0 and not config.images:
+        raise FsidError(
+            f"crops: {config.crops}, but crop_width and crop_height leave {config.windows} different ones, "
+            "and near-duplicates are refused"
+        )
     pictures = len(find_pictures(Path(config.images))) if config.images else 0
     pairs = config.pairs_per_frame
     shard_size = shard_size or -(-SHARD_SIZE // pairs) * pairs
