@@ -9,21 +9,9 @@ import numpy as np
 from PIL import ExifTags, Image
 
 from fsid.errors import FsidError
+from fsid.sensor import upright
 
 PHOTO_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".bmp")
-
-
-_TURN = Image.Transpose
-_UPRIGHT = {
-    2: _TURN.FLIP_LEFT_RIGHT,
-    3: _TURN.ROTATE_180,
-    4: _TURN.FLIP_TOP_BOTTOM,
-    5: _TURN.TRANSPOSE,
-    6: _TURN.ROTATE_270,
-    7: _TURN.TRANSVERSE,
-    8: _TURN.ROTATE_90,
-}
-"""By EXIF's orientation. Pillow's `exif_transpose` writes all of EXIF anew; a faulty tag makes that fail."""
 
 
 def find_photos(folder: Path) -> list[Path]:
@@ -56,15 +44,19 @@ def read_photo(path: Path) -> np.ndarray:
 
 
 def _decoded(image: Image.Image) -> np.ndarray:
-    """(H, W, 3) float32 0..1, upright; Pillow's own conversion of 16-bit grey would clip it to white."""
-    turn = _UPRIGHT.get(image.getexif().get(ExifTags.Base.Orientation, 1))
-    upright = image if turn is None else image.transpose(turn)
+    """(H, W, 3) float32 0..1, upright."""
+    # not Pillow's exif_transpose: it writes all of EXIF anew, and a faulty tag makes that fail
+    return upright(_values(image), image.getexif().get(ExifTags.Base.Orientation, 1))
+
+
+def _values(image: Image.Image) -> np.ndarray:
+    """(H, W, 3) float32 0..1, as stored; Pillow's own conversion of 16-bit grey would clip it to white."""
     if image.mode.startswith("I;16") or (image.mode, image.format) == ("I", "PNG"):
-        grey = np.asarray(upright, np.float32) / np.float32(65535.0)
+        grey = np.asarray(image, np.float32) / np.float32(65535.0)
         return grey[..., None].repeat(3, axis=2)
     if image.mode in ("I", "F"):
         raise ValueError("its values are not 8-bit or 16-bit unsigned integers")
-    return np.asarray(upright.convert("RGB"), np.float32) / np.float32(255.0)
+    return np.asarray(image.convert("RGB"), np.float32) / np.float32(255.0)
 
 
 def crop_rand(rng: np.random.Generator, pixels: np.ndarray, height: int, width: int) -> np.ndarray:

@@ -193,7 +193,7 @@ def _data(out: Path, config: ExperimentConfig, source: str, bar: ProgressBar, wo
     seed, count = config.seeds[0], _count(config, source)
     settings = _generator(out, config, source)
     if source == DEAD_LEAVES:
-        pictures = out / "dead-leaves"
+        pictures = Path(settings.images)
         with bar("drawing dead leaves", "pictures") as progress:
             write_dead_leaves(
                 pictures, count, height=config.height, width=config.width, seed=seed, progress=progress

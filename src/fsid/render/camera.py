@@ -17,11 +17,11 @@ import numpy as np
 
 from fsid.errors import FsidError
 from fsid.render.drawable import turn_about
-from fsid.scene.distortion import rays_of
+from fsid.scene.distortion import focal_of, rays_of
 from fsid.scene.model import Camera, Distortion
 
 NEAR_M = 0.02
-MODELS = {"brown-conrady": 1, "fisheye": 2}
+_SHADER_MODELS = {"brown-conrady": 1, "fisheye": 2}
 """Distortion model -> its number in shaders/lens.glsl."""
 
 _MOST_PIXELS = 3.0
@@ -78,8 +78,7 @@ def lens_of(camera: Camera, time_s: float | None = None) -> Lens:
     since = 0.0 if time_s is None else time_s - camera.time_s
     rotation = rotation @ turn_about(camera.spin_deg_s, since).T
     position = position + np.array(camera.velocity_m_s) * since
-    focal_x = 1.0 / np.tan(np.radians(camera.fov_deg) / 2)
-    focal = (float(focal_x), float(focal_x * camera.width / camera.height))
+    focal = focal_of(camera)
     if camera.distortion is None:
         return Lens(rotation, position, focal, (camera.width, camera.height), focal, 0, (0.0,) * 5)
     return _bent(camera, camera.distortion, rotation, position, focal)
@@ -93,7 +92,7 @@ def _bent(
     focal: tuple[float, float],
 ) -> Lens:
     """The pinhole image covers all rays of the bent one, at its finest resolution."""
-    image, rays, half = rays_of(distortion, camera, focal)
+    image, rays, half = rays_of(distortion, camera)
     finest = np.abs(np.diff(image[32, :, 0])).max() / np.abs(np.diff(rays, axis=1)[..., 0]).min()
     size = np.array([camera.width, camera.height])
     pixels = half * np.array(focal) * size * min(finest, 1.5)
@@ -102,4 +101,4 @@ def _bent(
     seen_focal = (float(1 / half[0]), float(1 / half[1]))
     given = distortion.coefficients
     k = (*given, *(0.0,) * (5 - len(given)))
-    return Lens(rotation, position, focal, seen_px, seen_focal, MODELS[distortion.model], k)
+    return Lens(rotation, position, focal, seen_px, seen_focal, _SHADER_MODELS[distortion.model], k)

@@ -44,7 +44,7 @@ def undistorted(distortion: Distortion | None, points: np.ndarray) -> np.ndarray
     """The inverse of `distorted` (Newton's method). FsidError where the lens cannot be inverted there."""
     if distortion is None:
         return points
-    _check_model(distortion)
+    check_model(distortion)
     if distortion.model == "fisheye":
         return _undistorted_fisheye(distortion, points)
     p, step = points.astype(float), 1e-6
@@ -92,27 +92,33 @@ def _not_invertible() -> FsidError:
     )
 
 
-def _check_model(distortion: Distortion) -> None:
+def check_model(distortion: Distortion) -> None:
+    """FsidError unless the model is one of MODELS and has its number of coefficients."""
     if distortion.model not in MODELS:
         raise FsidError(
-            f"scene.cameras: distortion.model '{distortion.model}': use 'brown-conrady' or 'fisheye'"
+            f"scene.cameras: distortion model '{distortion.model}' does not exist; "
+            f"choose one of: {', '.join(MODELS)}"
         )
-    count = MODELS[distortion.model]
-    if len(distortion.coefficients) != count:
-        raise FsidError(f"scene.cameras: distortion '{distortion.model}' needs {count} coefficients")
+    count, given = MODELS[distortion.model], len(distortion.coefficients)
+    if given != count:
+        raise FsidError(
+            f"scene.cameras: distortion {distortion.model} needs {count} coefficients, not {given}"
+        )
 
 
-def rays_of(
-    distortion: Distortion, camera: Camera, focal: tuple[float, float]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def focal_of(camera: Camera) -> tuple[float, float]:
+    """Focal length in half widths and half heights of the image."""
+    focal = 1.0 / np.tan(np.radians(camera.fov_deg) / 2)
+    return float(focal), float(focal * camera.width / camera.height)
+
+
+def rays_of(distortion: Distortion, camera: Camera) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Image coordinates on a grid over the image of `camera` and a pixel beyond, (65, 65, 2), pinhole ones of
     the same points, and the half size (2,) that covers these. FsidError where the lens has no inverse there.
-
-    focal: x, y in half sizes.
     """
     widest = 1.0 + 2.0 / min(camera.width, camera.height)
     t = np.linspace(-widest, widest, 65)
-    image = np.stack(np.meshgrid(t, t), axis=-1) / np.array(focal)
+    image = np.stack(np.meshgrid(t, t), axis=-1) / np.array(focal_of(camera))
     rays = undistorted(distortion, image)
     low, high = rays.reshape(-1, 2).min(0), rays.reshape(-1, 2).max(0)
     half = np.maximum(np.abs(low), np.abs(high)) * 1.001

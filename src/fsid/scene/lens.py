@@ -16,7 +16,7 @@ import numpy as np
 from fsid.errors import FsidError
 from fsid.scene.camera_config import LensConfig
 from fsid.scene.choice import log_uniform_rand
-from fsid.scene.distortion import MODELS, rays_of
+from fsid.scene.distortion import check_model, rays_of
 from fsid.scene.model import Camera, Distortion
 
 MAX_FISHEYE_DEG = 80.0
@@ -72,15 +72,7 @@ def corner_radius(camera: Camera) -> float:
 
 def check_distortion(distortion: Distortion, corner: float) -> None:
     """Raise FsidError unless the distortion has an inverse up to the radius `corner`, see `corner_radius`."""
-    if distortion.model not in MODELS:
-        raise FsidError(
-            f"distortion model '{distortion.model}' does not exist; choose one of: {', '.join(MODELS)}"
-        )
-    if len(distortion.coefficients) != MODELS[distortion.model]:
-        raise FsidError(
-            f"distortion: {distortion.model} has {MODELS[distortion.model]} coefficients, "
-            f"not {len(distortion.coefficients)}"
-        )
+    check_model(distortion)
     if not _is_invertible(distortion, corner):
         raise FsidError(
             f"distortion {distortion.coefficients} of {distortion.model} folds the image over before its "
@@ -109,9 +101,8 @@ def _even(at: np.ndarray, coefficients: tuple[float, ...]) -> np.ndarray:
 
 def _has_rays(distortion: Distortion, camera: Camera) -> bool:
     """Whether the camera can be rendered with it: beyond the corner by a pixel, and not too wide."""
-    focal = 1.0 / np.tan(np.radians(camera.fov_deg) / 2)
     try:
-        rays_of(distortion, camera, (float(focal), float(focal * camera.width / camera.height)))
+        rays_of(distortion, camera)
     except FsidError:
         return False
     return True
