@@ -36,34 +36,39 @@ vec3 arriving(Light light, vec3 to_light, float distance_m) {
     return light.colour * (cone / (reach * reach));
 }
 
-// Integral of cos(theta) / pi around z over a rectangle above the horizon (Lambert 1760, as summed over edges by
-// Baum et al. 1989), seen from `position`, its directions bent by `bend`.
-vec3 corner_of(Light light, vec3 centre, mat3 bend, int i) {
-    float x = i == 1 || i == 2 ? 1.0 : -1.0, y = i == 2 || i == 3 ? 1.0 : -1.0;
-    return bend * (centre + x * light.half_width + y * light.half_height);
+// Angle between unit vectors over its sine, from their cosine in 0..1: within 7e-7 (tools/fit_arc.py).
+float arc(float cosine) {
+    return (1.57079534 + cosine * (0.90187848 + cosine * 0.02565153))
+         / (1.0 + cosine * (1.21072969 + cosine * 0.28759566));
 }
 
-float form_factor(Light light, vec3 position, mat3 bend, int edges) {
-    vec3 centre = light.position - position;
-    vec3 leaves = vec3(0), returns = vec3(0);
+// Integral of cos(theta) / pi around z over a rectangle above the horizon (Lambert 1760, as summed over edges by
+// Baum et al. 1989), seen from `position`, its directions bent by `bend`. wanted: false gives 0, soon.
+float form_factor(Light light, vec3 position, mat3 bend, bool wanted) {
+    vec3 centre = bend * (light.position - position);
+    vec3 w = bend * light.half_width, h = bend * light.half_height;
+    vec3 leaves = vec3(0), returns = vec3(0), a = centre - w - h;
     float sum = 0.0;
     bool cut = false;
-    int i = 0;
+    int i = wanted ? 0 : 4;
     do {
         bool side = i < 4;     // the last edge closes what the horizon cuts
-        vec3 a = side ? corner_of(light, centre, bend, i) : leaves;
-        vec3 b = side ? corner_of(light, centre, bend, (i + 1) & 3) : returns;
+        vec3 b = side ? centre + (i < 2 ? w : -w) + (i == 1 || i == 2 ? h : -h) : returns;
+        a = side ? a : leaves;
         vec3 crossing = mix(a, b, clamp(a.z / (abs(a.z - b.z) > 1e-9 ? a.z - b.z : 1e-9), 0.0, 1.0));
         bool down = side && a.z > 0.0 && b.z <= 0.0, up = side && a.z <= 0.0 && b.z > 0.0;
         leaves = down ? crossing : leaves;
         returns = up ? crossing : returns;
         cut = cut || down;
-        vec3 p = normalize(up ? crossing : a), q = normalize(down ? crossing : b);
-        vec3 across = cross(p, q);
-        float s = length(across);
-        bool counts = i < edges && (side ? max(a.z, b.z) > 0.0 : cut);
-        sum += counts && s > 1e-7 ? across.z * (atan(s, dot(p, q)) / s) : 0.0;
-    } while (++i < edges);
+        vec3 p = up ? crossing : a, q = down ? crossing : b;
+        float unit = inversesqrt(max(dot(p, p) * dot(q, q), 1e-30)), cosine = dot(p, q) * unit;
+        vec3 across = cross(p, q) * unit;
+        float ratio = arc(min(abs(cosine), 1.0));
+        ratio = cosine < 0.0 ? PI * inversesqrt(max(dot(across, across), 1e-14)) - ratio : ratio;
+        bool counts = side ? max(a.z, b.z) > 0.0 : cut;
+        sum += counts ? across.z * ratio : 0.0;
+        a = b;
+    } while (++i < 4 || i == 4 && cut);
     return abs(sum) * (0.5 / PI);
 }
 
@@ -72,3 +77,6 @@ mat3 upright(vec3 n) {
     vec3 aside = normalize(cross(n, abs(n.x) < 0.7 ? vec3(1, 0, 0) : vec3(0, 1, 0)));
     return transpose(mat3(aside, cross(n, aside), n));
 }
+
+// The other way round in z.
+mat3 flipped(mat3 bend) { return mat3(1, 0, 0, 0, 1, 0, 0, 0, -1) * bend; }

@@ -51,10 +51,16 @@ struct Reflector {
     float alpha, alpha2;  // GGX
     vec3 rebound;         // what one bounce between microfacets loses, given back (Turquin 2019)
     vec3 mirror;          // share of even surroundings that the GGX lobe reflects
+#if AREAS
+    mat3 facing, lobe;    // bend directions so that the body's and the mirror's share of light is a cosine around z
+#endif
 #if LOBES
     // The layers above take their share of what arrives at those below.
     float coat, coated, coat_alpha, sheen, cloth, below;
     vec3 through;         // diffuse light that leaves on the other side
+#if AREAS
+    mat3 coat_lobe;
+#endif
 #endif
 };
 
@@ -86,6 +92,13 @@ Reflector reflector_of(Sample p, Surface s, Matter m, float spread) {
     b.f0 = mix(vec3(s.specular), m.albedo, m.metallic);
     b.rebound = 1.0 + b.f0 * (1.0 / max(share.x + share.y, 0.1) - 1.0);
     b.mirror = b.rebound * (b.f0 * share.x + min(share.y, 50.0 * max(b.f0.r, max(b.f0.g, b.f0.b))));
+#if AREAS
+    b.facing = upright(b.n);
+    b.lobe = lobe_of(sqrt(b.alpha), b.n, b.v);
+#if LOBES
+    b.coat_lobe = lobe_of(sqrt(b.coat_alpha), b.n, b.v);
+#endif
+#endif
     return b;
 }
 
@@ -106,17 +119,17 @@ vec3 returned(Light light, Sample p, Reflector b) {
         + (b.coated * coat_reflected(coat_wide, b.n, b.v, l) + b.sheen * fuzz(b.n, b.v, l)) * arrives;
 #endif
 #if AREAS
-    bool area = light.kind == AREA;
-    int edges = area && dot(to_light, light.direction) < 0.0 ? 5 : 0;
-    float front = form_factor(light, p.position, upright(b.n), edges);
-    float glossy = form_factor(light, p.position, lobe_of(sqrt(b.alpha), b.n, b.v), edges);
+    bool area = light.kind == AREA, seen = area && dot(to_light, light.direction) < 0.0;
+    float front = form_factor(light, p.position, b.facing, seen);
+    float glossy = form_factor(light, p.position, b.lobe, seen);
     vec3 from_area = b.diffuse * front + b.mirror * glossy;
 #if LOBES
+    bool passes = max(b.through.r, max(b.through.g, b.through.b)) > 0.0;
     from_area = from_area * b.below + b.cloth * front
-        + b.coat * form_factor(light, p.position, lobe_of(sqrt(b.coat_alpha), b.n, b.v), edges)
-        + b.through * form_factor(light, p.position, upright(-b.n), edges);
+        + b.coat * form_factor(light, p.position, b.coat_lobe, seen && b.coat > 0.0)
+        + b.through * form_factor(light, p.position, flipped(b.facing), seen && passes);
 #endif
-    result = area ? edges > 0 ? light.colour * from_area : vec3(0) : result;
+    result = area ? seen ? light.colour * from_area : vec3(0) : result;
 #endif
     return result;
 }

@@ -35,7 +35,8 @@ layout(location = 2) out vec4 out_normal;     // camera space, 0.5 + 0.5 n
 #endif
 
 // Light of all lights. First those whose shadow is interpolated; the others need their own, which costs much
-// more, one after the other: lights differ from pixel to pixel in that loop, so that it is short.
+// more, one after the other: lights differ from pixel to pixel in that loop, so that it is short. Where only
+// these count (OWN 1 and 2) the first loop does no more than find them.
 // missing: whether some were left out.
 vec3 lights_on(Sample p, Reflector b, Blocks blocks, inout bool missing) {
     vec3 sum = vec3(0);
@@ -46,21 +47,24 @@ vec3 lights_on(Sample p, Reflector b, Blocks blocks, inout bool missing) {
         do {
             vec4 four = interpolated(blocks, i / 4);
             do {
-                vec3 light = returned(light_at(i), p, b);
-                bool wanted = i < light_count && max(light.r, max(light.g, light.b)) > 0.0;
                 float lit = four[i & 3];
+                bool wanted = i < light_count;
+#if OWN == 0
+                vec3 light = returned(light_at(i), p, b);
+                wanted = wanted && max(light.r, max(light.g, light.b)) > 0.0;
+                sum += wanted && lit <= 1.0 ? lit * light : vec3(0);
+#endif
                 left |= wanted && lit > 1.0 ? 1u << (i - first) : 0u;
-                sum += OWN != 1 && wanted && lit <= 1.0 ? lit * light : vec3(0);
             } while ((++i & 3) != 0 && i < light_count);
         } while (i < min(light_count, first + 32));
         missing = missing || left != 0u;
 #if OWN
         do {
-            bool wanted = left != 0u;
-            Light light = light_at(first + (wanted ? findLSB(left) : 0));
-            bool even;
+            Light light = light_at(first + max(findLSB(left), 0));
+            vec3 arrives = left != 0u ? returned(light, p, b) : vec3(0);
+            bool even, wanted = max(arrives.r, max(arrives.g, arrives.b)) > 0.0;
             float lit = visibility(light, p.position, p.face_normal, wanted, 0.0, even);
-            sum += wanted ? lit * returned(light, p, b) : vec3(0);
+            sum += wanted ? lit * arrives : vec3(0);
             left &= left - 1u;
         } while (left != 0u);
 #endif
