@@ -2,10 +2,10 @@
 
 Mesa's llvmpipe draws into a row of scenes of its own. Each keeps what it has read until it is used again, and
 the first idle one is always taken: those at the end of the row, which only a busy moment reaches, hold images
-that were freed many frames ago. A busy moment made on purpose empties them all. It costs the next frame a
-seventh, so it is made only before much is freed. In Mesa 25 the state of the last shader that read textures
-holds them, too, until another that reads one takes its place, so the busy shader reads one. Other drivers
-have nothing to give back.
+that were freed many frames ago. A busy moment made on purpose empties them all: an image of a single tile, so
+that one thread draws it, however many there are. It takes a hundredth of a frame, so it is made only before
+much is freed. In Mesa 25 the state of the last shader that read textures holds them, too, until another that
+reads one takes its place, so the busy shader reads one. Other drivers have nothing to give back.
 """
 
 from __future__ import annotations
@@ -17,14 +17,15 @@ from fsid.render.programs import load_program
 _SCENES = 64
 """Scenes in the row, at most (Mesa's MAX_SCENES)."""
 
-_BUSY_PX = 512
+_BUSY_PX = 64
+"""Mesa's TILE_SIZE."""
 
 _UNIT = 16
 """The texture unit of busy.frag, which no other shader has."""
 
 
 class Drain:
-    """One slow image, and as many small ones waiting behind it as the row has scenes: milliseconds."""
+    """One slow image, and as many small ones waiting behind it as the row has scenes: 20 ms."""
 
     def __init__(self, context: moderngl.Context) -> None:
         self._context = context

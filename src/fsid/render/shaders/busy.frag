@@ -5,7 +5,7 @@ out vec4 result;
 
 void main() {
     vec4 value = gl_FragCoord + texelFetch(nothing, ivec2(0), 0);
-    int left = 400;
+    int left = 2000;
     do value = sin(value); while (--left > 0);
     result = value;
 }
