@@ -45,35 +45,53 @@ def same(a: Frame, b: Frame) -> bool:
 
 
 @pytest.mark.parametrize("seed", [1, 4])
-def test_tiles_that_nobody_sees_and_places_without_glass_are_left_out(
+def test_tiles_that_nobody_sees_are_left_out(
     renderer: Renderer, seed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    import fsid.render.shade_pass as shade_pass
-    import fsid.render.shadow_pass as shadow_pass
+    import fsid.render.shadow_pass as module
 
     what = scene(seed)
     answers: list[bool] = []
-    sees, rectangles = shadow_pass.sees, shade_pass.rectangles
+    sees = module.sees
 
     def counting(*arguments):
         answers.append(sees(*arguments))
         return answers[-1]
 
-    monkeypatch.setattr(shadow_pass, "sees", counting)
+    monkeypatch.setattr(module, "sees", counting)
     less = renderer.render(what)
     assert {False, True} == set(answers)
-    monkeypatch.setattr(shadow_pass, "sees", lambda *rest: True)
-    monkeypatch.setattr(shade_pass, "rectangles", lambda *rest: [(0, 0, *rest[-1])])
+    monkeypatch.setattr(module, "sees", lambda *rest: True)
     assert same(less, renderer.render(what))
-    assert rectangles is not shade_pass.rectangles
+
+
+BENT = Distortion("brown-conrady", (-0.12, 0.02, 0.001, -0.001, 0.0))
+EVERYWHERE = "#version 430 core\nvoid main() { gl_FragDepth = 0.0; }\n"
+
+
+@pytest.mark.parametrize("lens", [None, BENT])
+def test_glass_is_drawn_only_where_there_is_some(
+    renderer: Renderer, lens: Distortion | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import fsid.render.programs as module
+
+    what = scene(1)
+    what = replace(what, cameras=(replace(what.cameras[0], distortion=lens),))
+    less, source = renderer.render(what), module._source
+    monkeypatch.setattr(renderer._shade, "_programs", {})
+    monkeypatch.setattr(
+        module, "_source", lambda name: EVERYWHERE if name == "glass_marks.frag" else source(name)
+    )
+    assert same(less, renderer.render(what))
+    monkeypatch.setattr(renderer._shade, "draw_glass", lambda *rest: None)
+    assert not same(less, renderer.render(what))
 
 
 def test_a_bent_lens_sees_its_tiles_too(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
     import fsid.render.shadow_pass as module
 
     what = scene(4)
-    lens = Distortion("brown-conrady", (-0.12, 0.02, 0.001, -0.001, 0.0))
-    what = replace(what, cameras=(replace(what.cameras[0], distortion=lens),))
+    what = replace(what, cameras=(replace(what.cameras[0], distortion=BENT),))
     less = renderer.render(what)
     monkeypatch.setattr(module, "sees", lambda *rest: True)
     assert same(less, renderer.render(what))

@@ -1,7 +1,6 @@
 """What can be seen at all, so that nothing else is drawn: all answers err on the side of seeing.
 
 in_view       spheres in a pyramid
-rectangles    parts of an image that hold spheres
 sees          whether a lens can look into a tile of a shadow map
 """
 
@@ -24,32 +23,6 @@ def in_view(
         beyond = np.abs(local[:, axis]) - tan_xy[axis] * local[:, 2]
         inside &= beyond < radius * np.hypot(1.0, tan_xy[axis])
     return inside
-
-
-def rectangles(
-    spheres: np.ndarray,
-    origin: np.ndarray,
-    axes: np.ndarray,
-    focal: tuple[float, float],
-    shift: tuple[float, float],
-    size: tuple[int, int],
-) -> list[tuple[int, int, int, int]]:
-    """(x, y, width, height) in pixels that hold the images of spheres, as `in_view`; where that would be more
-    than the image, and where one is around the eye, the whole image. focal, shift: half image sizes."""
-    whole = [(0, 0, *size)]
-    found = []
-    local = (spheres[:, :3] - origin) @ axes.T * (1, -1, 1)
-    for centre, radius in zip(local, spheres[:, 3], strict=True):
-        if centre[2] <= 1.01 * radius:
-            return whole
-        depths = centre[2] + radius * np.array([[-1.0], [1.0]])
-        sides = np.stack([centre[:2] - radius, centre[:2] + radius])[:, None] / depths
-        ndc = sides.reshape(4, 2) * focal + shift
-        low = np.clip(np.floor((ndc.min(0) * 0.5 + 0.5) * size) - 1, 0, size).astype(int)
-        high = np.clip(np.ceil((ndc.max(0) * 0.5 + 0.5) * size) + 1, 0, size).astype(int)
-        if (high > low).all():
-            found.append((int(low[0]), int(low[1]), int(high[0] - low[0]), int(high[1] - low[1])))
-    return found if sum(w * h for _, _, w, h in found) < size[0] * size[1] else whole
 
 
 def sees(shot: Shot, tile: Tile, deepest_m: float) -> bool:

@@ -1,8 +1,8 @@
 """Shading: materials and radiance of each pixel, once per surface in it; glass over it in a second round.
 
 Most pixels find their shadows between those of the blocks. Lights whose shadow must be found in the pixel
-itself are drawn after the rest, where the rest has left a mark: on a CPU every pixel pays for all that a
-shader can do.
+itself are drawn after the rest, where the rest has left a mark, and glass only where there is some: on a CPU
+every pixel pays for all that a shader can do.
 
 What a scene does not have costs nothing: a program is compiled for each combination of lens, layers, area
 lights, glass and mirrors that occurs.
@@ -17,14 +17,13 @@ import numpy as np
 
 from fsid.render.buffers import Buffers
 from fsid.render.exposure import Shot
-from fsid.render.frustum import rectangles
 from fsid.render.layers import LayerStore
 from fsid.render.programs import load_program, set_uniforms
 from fsid.render.quality import Quality
 from fsid.render.reflectance import lobe_table, reflectance_table
 from fsid.render.shadow_pass import ShadowPass
 from fsid.render.stage import Stage
-from fsid.render.targets import Place, Targets
+from fsid.render.targets import Targets
 
 
 class ShadePass:
@@ -35,7 +34,7 @@ class ShadePass:
         self._quality = quality
         self._grid = grid
         self._shadows = shadows
-        self._programs: dict[tuple[tuple[str, int], ...], moderngl.Program] = {}
+        self._programs: dict[tuple[object, ...], moderngl.Program] = {}
         self._copy = load_program(context, "screen.vert", "copy_result.frag")
         shares = reflectance_table()
         table = np.concatenate([np.pad(shares, ((0, 0), (0, 0), (0, 1))), lobe_table()])
@@ -62,7 +61,7 @@ class ShadePass:
         planes = np.array([plane for plane, _ in mirrors])
 
         def draw_part(own: int) -> None:
-            program = self._program(shot.lens.model, stage, GLASS=0, PLANAR=planar, OWN=own)
+            program = self._shading(shot.lens.model, stage, GLASS=0, PLANAR=planar, OWN=own)
             set_uniforms(
                 program, block_lights=targets.block_lights, shining=float(shining), mirror_planes=planes
             )
@@ -83,13 +82,22 @@ class ShadePass:
         self, targets: Targets, stage: Stage, buffers: Buffers, shot: Shot, layers: LayerStore
     ) -> None:
         """Glass over the result so far."""
-        self._context.enable_only(moderngl.NOTHING)
-        targets.begin_glass(_places(stage.geometry.spheres[stage.glass], shot, targets.size))
-        program = self._program(shot.lens.model, stage, GLASS=1, PLANAR=0, OWN=2)
+        context, lens = self._context, shot.lens.model
+        marks = self._program("glass_marks.frag", LENS=lens)
+        _set_view(marks, targets, shot)
+        context.enable_only(moderngl.DEPTH_TEST)
+        context.depth_func = "1"
+        targets.begin_marks()
+        buffers.draw_screen(marks)
+        context.depth_func = ">"
+        targets.begin_glass()
+        program = self._shading(lens, stage, GLASS=1, PLANAR=0, OWN=2)
         set_uniforms(program, block_lights=0, shining=1.0)
         self._shade(program, targets, stage, buffers, shot, layers)
         targets.end_glass()
-        targets.draw(lambda: buffers.draw_screen(self._copy))
+        buffers.draw_screen(self._copy)
+        context.depth_func = "<"
+        context.enable_only(moderngl.NOTHING)
 
     def _shade(
         self,
@@ -113,14 +121,17 @@ class ShadePass:
         self._shadows.use(program, stage.plan)
         self._reflectance.use(14)
         buffers.use()
-        targets.draw(lambda: buffers.draw_screen(program))
+        buffers.draw_screen(program)
 
-    def _program(self, lens_model: int, stage: Stage, **defines: int) -> moderngl.Program:
-        defines |= {"LENS": lens_model, "LOBES": int(stage.has_lobes), "AREAS": int(stage.has_areas)}
-        key = tuple(defines.items())
+    def _shading(self, lens_model: int, stage: Stage, **defines: int) -> moderngl.Program:
+        lobes, areas = int(stage.has_lobes), int(stage.has_areas)
+        return self._program("shade.frag", LENS=lens_model, LOBES=lobes, AREAS=areas, **defines)
+
+    def _program(self, fragment: str, **defines: int) -> moderngl.Program:
+        key = (fragment, *defines.items())
         if key not in self._programs:
             self._programs[key] = load_program(
-                self._context, "screen.vert", "shade.frag", GRID=self._grid, **defines
+                self._context, "screen.vert", fragment, GRID=self._grid, **defines
             )
         return self._programs[key]
 
@@ -152,11 +163,3 @@ def _set_surroundings(program: moderngl.Program, stage: Stage, shot: Shot) -> No
         room_centre=room.centre_m,
         sky_level=-1.0 if sky is None else max(float(np.log2(pixel_rad * len(sky) / np.pi)), 0.0),
     )
-
-
-def _places(spheres: np.ndarray, shot: Shot, size: tuple[int, int]) -> list[Place]:
-    """Parts of the image that hold the spheres; of a bent image all of it."""
-    lens = shot.lens
-    if lens.model:
-        return [(0, 0, *size)]
-    return rectangles(spheres, lens.position, lens.rotation, lens.seen_focal, shot.seen_shift, lens.seen_px)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from ctypes import c_float, c_int, c_uint, c_void_p
 from typing import Any
 
@@ -18,10 +18,6 @@ _STRIP = 64  # rows read at once
 _COLOUR, _DEPTH = 0x1800, 0x1801
 
 
-Place = tuple[int, int, int, int]
-"""x, y, width, height of a part of the image, pixels."""
-
-
 class Targets:
     """G-buffer of grid^2 samples per pixel (20 bytes each), occlusion per 2 x 2 pixels, result per pixel."""
 
@@ -30,7 +26,6 @@ class Targets:
         self._grid = grid
         self._owned: list[Any] = []
         self._results: list[list[Any]] = []
-        self._drawn: tuple[list[Any], Sequence[Place]] = ([], [])
         self._lit: list[Any] = []
         self._overview: list[Any] = []
         self._lit_rows = 0
@@ -59,7 +54,8 @@ class Targets:
         self._open, self._blurred = (context.texture(self.blocks, n, dtype="f4") for n in (4, 2))
         self._marks = context.depth_renderbuffer(size)
         self._results = [self._result(self._marks)]
-        self._missing = [context.framebuffer([self._results[0][1]], self._marks)]
+        self._to_missing = context.framebuffer([self._results[0][1]], self._marks)
+        self._to_marks = context.framebuffer([], self._marks)
         images = [self._samples, self._depth, self._block_depth, self._open, self._blurred]
         for texture in images:
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
@@ -68,7 +64,7 @@ class Targets:
         self._to_open = context.framebuffer([self._open])
         self._to_blurred = context.framebuffer([self._blurred])
         framebuffers = [self._to_samples, self._to_block_depth, self._to_open, self._to_blurred]
-        self._owned = [*framebuffers, *self._missing, self._marks, *images]
+        self._owned = [*framebuffers, self._to_missing, self._to_marks, self._marks, *images]
 
     def begin_samples(self, *, over: bool) -> None:
         """Draw the G-buffer, from nothing; or only what lies in front of the depth that is there."""
@@ -140,11 +136,11 @@ class Targets:
         """Draw the result; units 8, 9 hold the G-buffer and the occlusion."""
         self._samples.use(8)
         self._open.use(9)
-        self._drawn = (self._results[0], [(0, 0, *self.size)])
+        self._results[0][0].use()
 
     def begin_missing(self) -> None:
         """Draw the radiance alone, once more; the depth marks the pixels that lack some."""
-        self._drawn = (self._missing, [(0, 0, *self.size)])
+        self._to_missing.use()
 
     def use_mirror(self, unit: int) -> None:
         """Bind radiance and depth, with mip levels, for what reflects them."""
@@ -152,28 +148,26 @@ class Targets:
         radiance.build_mipmaps()
         radiance.use(unit)
 
-    def begin_glass(self, places: Sequence[Place]) -> None:
-        """Draw, in some places only, what goes over the result; units 11 to 13 hold the result so far."""
+    def begin_marks(self) -> None:
+        """Draw new marks, depth alone; unit 8 holds the G-buffer."""
+        self._to_marks.use()
+
+    def begin_glass(self) -> None:
+        """Draw what goes over the result where the depth marks it, and keep that; units 11 to 13 hold it."""
         if len(self._results) == 1:
-            self._results.append(self._result())
-        for unit, texture in zip((11, 12, 13), self._results[0][1:], strict=True):
-            texture.use(unit)
-        self._drawn = (self._results[1], places)
+            self._results.append(self._result(self._marks))
+        self._start(1, behind=0)
 
     def end_glass(self) -> None:
-        """Draw the same places of the result; units 11 to 13 hold what belongs there."""
-        for unit, texture in zip((11, 12, 13), self._results[1][1:], strict=True):
-            texture.use(unit)
-        self._drawn = (self._results[0], self._drawn[1])
+        """Draw the result where there are marks; units 11 to 13 hold what belongs there."""
+        self._start(0, behind=1)
 
-    def draw(self, draw_screen: Callable[[], None]) -> None:
-        """Draw every place."""
-        (framebuffer, *_), places = self._drawn
-        for place in places:
-            framebuffer.scissor = place
-            framebuffer.use()
-            draw_screen()
-        framebuffer.scissor = None
+    def _start(self, result: int, behind: int) -> None:
+        for unit, texture in zip((11, 12, 13), self._results[behind][1:], strict=True):
+            texture.use(unit)
+        framebuffer = self._results[result][0]
+        framebuffer.depth_mask = result == 0
+        framebuffer.use()
 
     def read_radiance(self) -> tuple[np.ndarray, np.ndarray]:
         """(H, W, 3) radiance and (H, W) depth, inf where nothing was hit; row 0 at the top."""
@@ -226,7 +220,7 @@ class Targets:
         self._release_lit()
         self.size = self.seen = (0, 0)
 
-    def _result(self, marks: Any = None) -> list[Any]:
+    def _result(self, marks: Any) -> list[Any]:
         """A framebuffer and its images: radiance and depth; albedo and id; normal. marks: its depth."""
         radiance = self._context.texture(self.size, 4, dtype="f4")
         labels = [self._context.texture(self.size, 4, dtype="nu2") for _ in range(2)]

@@ -15,9 +15,12 @@ struct Sample {
     int surface;         // -1: nothing was hit
 };
 
+// The sample nearest to a ray.
+ivec2 texel_seen(vec3 ray) { return clamp(ivec2(seen_at(ray) * float(GRID)), ivec2(0), seen * GRID - 1); }
+
 Sample sample_at(vec2 at) {
     vec3 ray = ray_at(at);
-    ivec2 texel = clamp(ivec2(seen_at(ray) * float(GRID)), ivec2(0), seen * GRID - 1);
+    ivec2 texel = texel_seen(ray);
     uvec4 code = texelFetch(samples, texel, 0);
     vec3 face_normal = unpack_direction(code.y);
     float depth = uintBitsToFloat(code.w);

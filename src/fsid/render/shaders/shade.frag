@@ -144,12 +144,6 @@ void main() {
     for (int i = 0; i < COUNT; ++i) all[i] = sample_at(place_of(pixel, i));
 #if GLASS
     for (int i = 0; i < COUNT; ++i) open &= all[i].surface < 0 ? ~(1u << i) : ~0u;
-    if (open == 0u) {
-        out_radiance = texelFetch(behind, pixel, 0);
-        out_albedo = texelFetch(behind_albedo, pixel, 0);
-        out_normal = texelFetch(behind_normal, pixel, 0);
-        return;
-    }
 #endif
     vec3 sum = vec3(0), albedo = vec3(0), relief = vec3(0);
     int id = 0;
