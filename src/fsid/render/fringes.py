@@ -21,6 +21,7 @@ _REACH = 4
 """Pixels on either side that are interpolated."""
 _BEYOND = np.float32(0.25)
 """Share of the least and of the greatest value around by which an interpolated one may lie beyond it."""
+_STRIP = 64  # rows interpolated at once: what is in between stays in the cache
 
 
 def with_margin(camera: Camera) -> tuple[Camera, int]:
@@ -63,12 +64,18 @@ def magnified(radiance: np.ndarray, camera: Camera, margin: int) -> np.ndarray:
         return radiance
     inner = radiance[margin : margin + camera.height, margin : margin + camera.width].copy()
     for colour, growth in zip((0, 2), camera.chromatic_aberration, strict=True):
-        plane = radiance[..., colour]
-        for axis, size in enumerate((camera.height, camera.width)):
-            middle = (size - 1) / 2
-            plane = _interpolated(plane, (np.arange(size) - middle) / (1 + growth) + middle + margin, axis)
-        inner[..., colour] = plane
+        plane = np.ascontiguousarray(radiance[..., colour])
+        rows, columns = (_places(size, growth) + margin for size in (camera.height, camera.width))
+        for first in range(0, len(rows), _STRIP):
+            strip = slice(first, first + _STRIP)
+            inner[strip, :, colour] = _interpolated(_interpolated(plane, rows[strip], 0), columns, 1)
     return inner
+
+
+def _places(size: int, growth: float) -> np.ndarray:
+    """Where along an axis of `size` pixels an image is that is magnified by 1 + growth."""
+    middle = (size - 1) / 2
+    return (np.arange(size) - middle) / (1 + growth) + middle
 
 
 def _interpolated(plane: np.ndarray, places: np.ndarray, axis: int) -> np.ndarray:
