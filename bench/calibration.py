@@ -17,7 +17,9 @@ from fsid.sensor.camera_profile import CameraProfile
 ISOS = tuple(50.0 * 2**stop for stop in range(10))  # 50 .. 25600
 
 
-def burst(rng: np.random.Generator, clean: Raw, iso: float, profile: CameraProfile, frames: int):
+def burst(
+    rng: np.random.Generator, clean: Raw, iso: float, profile: CameraProfile, frames: int
+) -> TemporalStatistics:
     stats = TemporalStatistics(profile.white_level)
     for _ in range(frames):
         stats.add(to_dn(noisy_from_clean(rng, clean, iso, profile.level(iso))))

@@ -16,6 +16,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -24,8 +25,9 @@ from fsid.dataset import GenerateConfig, encode, generate
 from fsid.dataset.attempt import Attempt
 from fsid.dataset.crew import thread_limits
 from fsid.dataset.shards import write_shard
+from fsid.dataset.tasks import SceneRenderer
 from fsid.dataset.worker import rendering
-from fsid.render import Frame, Renderer
+from fsid.render import Renderer
 from fsid.scene import Scene
 from fsid.scene.config import SceneConfig
 
@@ -39,12 +41,12 @@ class Timed:
         self._renderer, self.cpu_s = renderer, 0.0
         self.scenes: list[Scene] = []
 
-    def render(self, scene: Scene, camera_index: int = 0) -> Frame:
+    def radiance(self, scene: Scene, camera_index: int = 0) -> np.ndarray:
         start = time.process_time()
-        frame = self._renderer.render(scene, camera_index)
+        light = self._renderer.radiance(scene, camera_index)
         self.cpu_s += time.process_time() - start
         self.scenes.append(scene)
-        return frame
+        return light
 
 
 @dataclass(frozen=True)
@@ -77,13 +79,13 @@ def stages(config: GenerateConfig, pairs: int) -> Pair:
         total = time.process_time() - start
         again = Timed(renderer)
         for scene in timed.scenes:
-            renderer.render(scene)
-            again.render(scene)
+            renderer.radiance(scene)
+            again.radiance(scene)
     return Pair(timed.cpu_s / pairs, again.cpu_s / pairs, (total - timed.cpu_s) / pairs, size // pairs)
 
 
 def make(
-    config: GenerateConfig, frame: int, renderer: Renderer | Timed
+    config: GenerateConfig, frame: int, renderer: SceneRenderer | None
 ) -> list[tuple[str, dict[str, bytes]]]:
     """The encoded samples of a frame, whatever the checks say."""
     free = replace(config, checks=replace(config.checks, black_share=1.0, blown_share=1.0))
@@ -171,7 +173,7 @@ def render_seconds(config: GenerateConfig, renderer: Renderer, scenes: int = 2) 
     for i in range(scenes):
         scene = Attempt(config, 0, i).drawn_scene()
         renderer.render(scene)
-        total += min(seconds(lambda scene=scene: renderer.render(scene)) for _ in range(2))
+        total += min(seconds(partial(renderer.render, scene)) for _ in range(2))
     return total / scenes
 
 
@@ -191,7 +193,7 @@ def loader(processes: int = 2) -> None:
         write_noise(Path(folder))
         config = PatchConfig(128, 16, ("pixel6", "galaxy-s22"), 400, 8000)
         patches = PatchDataset(Path(folder), config, seed=0)
-        rates = {}
+        rates: dict[int, float] = {}
         for count in (0, processes, 0, processes):
             times = [time.perf_counter() for _ in batches(patches, range(300), count)]
             rate = 240 * config.batch / (times[-1] - times[-241])

@@ -15,6 +15,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import torch
@@ -38,7 +39,7 @@ class _PlainNorm(torch.autograd.Function):
     """Layer norm over channels with its gradient written out, (B, C, H, W), as the reference has it."""
 
     @staticmethod
-    def forward(ctx, x: Tensor, weight: Tensor, bias: Tensor, eps: float) -> Tensor:
+    def forward(ctx: Any, x: Tensor, weight: Tensor, bias: Tensor, eps: float) -> Tensor:
         mean = x.mean(1, keepdim=True)
         deviation = ((x - mean).pow(2).mean(1, keepdim=True) + eps).sqrt()
         y = (x - mean) / deviation
@@ -46,7 +47,7 @@ class _PlainNorm(torch.autograd.Function):
         return weight[:, None, None] * y + bias[:, None, None]
 
     @staticmethod
-    def backward(ctx, gradient: Tensor) -> tuple[Tensor, Tensor, Tensor, None]:
+    def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, Tensor, Tensor, None]:
         y, deviation, weight = ctx.saved_tensors
         g = gradient * weight[:, None, None]
         inner = (g - y * (g * y).mean(1, keepdim=True) - g.mean(1, keepdim=True)) / deviation
@@ -83,7 +84,7 @@ def plain(net: RawDenoiser) -> RawDenoiser:
                 if isinstance(child, NAFBlock):
                     setattr(module, name, _PlainBlock(child))
     net.net.intro.register_forward_pre_hook(lambda m, given: given[0].contiguous())
-    return net.to(memory_format=torch.contiguous_format)
+    return net.to(memory_format=torch.contiguous_format)  # type: ignore[call-overload]
 
 
 def clock() -> float:

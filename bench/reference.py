@@ -92,8 +92,8 @@ def direct(
     """Prints how both agree about light that comes straight from the lights; returns both images."""
     if scene.sky is not None:
         raise SystemExit(f"seed {scene.seed} is open air, where the sky is a light too: choose a room")
-    plain = {"softness_px": 0.0, "sharpening": 0.0, "colour_contrast": (0.0, 0.0)}
-    camera = replace(scene.cameras[0], aperture_m=0.0, exposure_s=0.0, **plain)
+    camera = replace(scene.cameras[0], aperture_m=0.0, exposure_s=0.0)
+    camera = replace(camera, softness_px=0.0, sharpening=0.0, colour_contrast=(0.0, 0.0))
     scene = replace(scene, cameras=(camera,))
     drawn, traced = raster.draw(without_walls_light(scene)), path_tracer.render(scene)
     kinds = ", ".join(light.kind for light in scene.lights)

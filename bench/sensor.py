@@ -10,6 +10,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -85,9 +86,12 @@ def main(megapixels: float) -> None:
     report("pack", x, lambda: pack(x, cfa), lambda: pack(light, cfa), lambda: transcribed.pack(x, cfa))
     for electrons in (1, 10, 100, 5000):
         lam = x * np.float32(electrons)
-        counts, tensor = lambda lam=lam: poisson(rng, lam), torch.from_numpy(lam)
-        numpy = lambda lam=lam: rng.poisson(lam)  # noqa: E731
-        report(f"Poisson, 0..{electrons} electrons", x, counts, lambda t=tensor: torch.poisson(t), numpy)
+        works = (
+            partial(poisson, rng, lam),
+            partial(torch.poisson, torch.from_numpy(lam)),
+            partial(rng.poisson, lam),
+        )
+        report(f"Poisson, 0..{electrons} electrons", x, *works)
 
 
 if __name__ == "__main__":
