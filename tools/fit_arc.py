@@ -3,8 +3,7 @@
     arccos(c) / sqrt(1 - c^2) = (a0 + a1 c + a2 c^2) / (1 + b1 c + b2 c^2),   0 <= c <= 1,   exact at c = 1
 
 with the least greatest relative error, by least squares whose weights grow where the error is large (Lawson
-1961). An edge of a light is seen under this angle. The fraction takes the place of an arc tangent, two roots
-and a division.
+1961). An edge of a light is seen under this angle. The fraction takes the place of an arc tangent.
 """
 
 from __future__ import annotations
@@ -20,12 +19,12 @@ def main() -> None:
     exact = np.arccos(cosine) / np.sqrt(1 - cosine**2)
     weight, found = np.ones_like(cosine), np.array([np.pi / 2, 1.0, 0.1, 1.0])
 
-    def error(numbers: np.ndarray) -> np.ndarray:
-        return np.asarray(arc(numbers, cosine) / exact - 1)
+    def error(numbers: np.ndarray, weight: np.ndarray | float = 1.0) -> np.ndarray:
+        return np.asarray(weight * (arc(numbers, cosine) / exact - 1))
 
     for _ in range(ROUNDS):
         tight = {"xtol": 1e-15, "ftol": 1e-15, "gtol": 1e-15}
-        found = least_squares(lambda numbers: weight * error(numbers), found, **tight).x  # noqa: B023
+        found = least_squares(error, found, args=(weight,), **tight).x
         off = np.abs(error(found))
         weight *= np.sqrt(off / off.max() + 0.3)
         weight /= weight.max()

@@ -25,7 +25,7 @@ _UNIT = 16
 
 
 class Drain:
-    """One slow image, and as many small ones waiting behind it as the row has scenes: 20 ms."""
+    """One slow image, and as many small ones waiting behind it as the row has scenes: 25 ms."""
 
     def __init__(self, context: moderngl.Context) -> None:
         self._context = context

@@ -153,21 +153,21 @@ class Targets:
         self._to_marks.use()
 
     def begin_glass(self) -> None:
-        """Draw what goes over the result where the depth marks it, and keep that; units 11 to 13 hold it."""
+        """Draw what goes over the result, where there are marks, which stay; units 11 to 13 hold it."""
         if len(self._results) == 1:
             self._results.append(self._result(self._marks))
-        self._start(1, behind=0)
+            self._results[1][0].depth_mask = False
+        self._draw_over(1)
 
     def end_glass(self) -> None:
         """Draw the result where there are marks; units 11 to 13 hold what belongs there."""
-        self._start(0, behind=1)
+        self._draw_over(0)
 
-    def _start(self, result: int, behind: int) -> None:
-        for unit, texture in zip((11, 12, 13), self._results[behind][1:], strict=True):
+    def _draw_over(self, result: int) -> None:
+        """Draw one of the two results; units 11 to 13 hold the other."""
+        for unit, texture in zip((11, 12, 13), self._results[1 - result][1:], strict=True):
             texture.use(unit)
-        framebuffer = self._results[result][0]
-        framebuffer.depth_mask = result == 0
-        framebuffer.use()
+        self._results[result][0].use()
 
     def read_radiance(self) -> tuple[np.ndarray, np.ndarray]:
         """(H, W, 3) radiance and (H, W) depth, inf where nothing was hit; row 0 at the top."""
