@@ -7,9 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fsid.assets import build_background
 from fsid.errors import FsidError
 from fsid.render.camera import lens_of
 from fsid.scene import (
+    BackgroundConfig,
     Camera,
     CameraConfig,
     Distortion,
@@ -173,6 +175,17 @@ def test_views_are_low_level_and_high():
             assert np.hypot(x, y) > 1.1
     assert min(elevations) < 12
     assert max(elevations) > 50
+
+
+def test_no_camera_stands_in_a_hill():
+    """Far away out of doors the ground rolls, and its triangles are coarse there."""
+    background = BackgroundConfig(kind_shares=(0, 0, 0, 1), hills_m=(60, 60), ground_m=(150, 150))
+    for seed in range(30):
+        drawn = scene(seed, camera=CameraConfig(distance_m=(30, 50)), background=background)
+        position = np.array(drawn.cameras[0].position_m)
+        ground = build_background("open-air", drawn.background.size_m).vertices
+        near = np.argsort(np.linalg.norm(ground[:, :2] - position[:2], axis=1))[:4]
+        assert position[2] > ground[near, 2].mean()
 
 
 @pytest.mark.parametrize("fisheye_share", [0.0, 1.0])

@@ -1,6 +1,12 @@
 """Everything a scene is made of: name and seed -> mesh, name and variant -> material maps."""
 
-from fsid.assets.backgrounds import BACKGROUND_PARTS, build_background, sweep_radius_m, table_size_m
+from fsid.assets.backgrounds import (
+    BACKGROUND_PARTS,
+    build_background,
+    ground_height_m,
+    sweep_radius_m,
+    table_size_m,
+)
 from fsid.assets.kinds import PART_KINDS, part_kind
 from fsid.assets.maps import MaterialMaps
 from fsid.assets.material_registry import (
@@ -30,6 +36,7 @@ __all__ = [
     "bake_material",
     "build_background",
     "build_mesh",
+    "ground_height_m",
     "material_colours",
     "material_families",
     "material_layers",

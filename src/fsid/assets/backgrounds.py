@@ -69,6 +69,17 @@ def sweep_radius_m(size_m: Sequence[float]) -> float:
     return 0.2 * min(size_m[1], size_m[2])
 
 
+def ground_height_m(size_m: Sequence[float], x_m: np.ndarray, y_m: np.ndarray) -> np.ndarray:
+    """Height of the ground of an open-air background at places along x and y, of any shape: metres."""
+    width, depth, relief_m = size_m
+    half = min(width, depth) / 2
+    flat = max(6.0, _FLAT_SHARE * half)
+    beyond = np.clip((np.hypot(x_m, y_m) - flat) / max(half - flat, 1e-9), 0, 1)
+    u, v = 2 * x_m / width, 2 * y_m / depth
+    hills = 0.5 + 0.25 * (np.sin(7.0 * u + 2.1 * np.sin(3.0 * v)) + np.sin(5.0 * v - 1.7 * np.sin(4.0 * u)))
+    return np.asarray(relief_m * hills * beyond**2 * (3 - 2 * beyond))
+
+
 def _side(side: int, x: float, y: float, low: float, high: float) -> Solid:
     """One quad of the box, facing inward; sides in the order +x, -x, +y, -y, +z, -z."""
     axis, sign = side // 2, 1 - 2 * (side % 2)
@@ -114,11 +125,7 @@ def _ground(x: float, y: float, relief_m: float) -> Solid:
     at = np.linspace(-1, 1, _GROUND_CELLS + 1)
     at = np.sign(at) * at**2
     grid_y, grid_x = np.meshgrid(at * y / 2, at * x / 2, indexing="ij")
-    flat = max(6.0, _FLAT_SHARE * min(x, y) / 2)
-    beyond = np.clip((np.hypot(grid_x, grid_y) - flat) / max(min(x, y) / 2 - flat, 1e-9), 0, 1)
-    u, v = 2 * grid_x / x, 2 * grid_y / y
-    hills = 0.5 + 0.25 * (np.sin(7.0 * u + 2.1 * np.sin(3.0 * v)) + np.sin(5.0 * v - 1.7 * np.sin(4.0 * u)))
-    height = relief_m * hills * beyond**2 * (3 - 2 * beyond)
+    height = ground_height_m((x, y, relief_m), grid_x, grid_y)
     vertices = np.stack([grid_x, grid_y, height], axis=-1).reshape(-1, 3)
     faces = _quads(_GROUND_CELLS + 1, _GROUND_CELLS + 1)
     return Solid(vertices, smooth_normals(vertices, faces), faces)

@@ -71,9 +71,7 @@ def sample(
     streams, fixed = _streams(seed), _streams(_FIXED_SEED)
     B, mood = background_rand(np.random.default_rng(streams.B), config)
     space, outdoors = space_of(B), B.kind == "open-air"
-    view, focus = camera_rand(
-        np.random.default_rng(streams.camera), config.camera, space, width, height, outdoors=outdoors
-    )
+    view, focus = camera_rand(np.random.default_rng(streams.camera), config.camera, B, width, height)
     cameras = _cameras_rand(streams, config, view)
     sky_source = sky_rand(np.random.default_rng(streams.sky), config) if outdoors else None
     lighting = lighting_rand(

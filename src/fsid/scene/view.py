@@ -14,12 +14,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from fsid.assets import ground_height_m
 from fsid.assets.solids import rotation_matrix
 from fsid.scene.camera_config import CameraConfig, MotionConfig, RigConfig
 from fsid.scene.choice import log_uniform_rand
 from fsid.scene.knobs import Range
-from fsid.scene.model import Camera, Motion
-from fsid.scene.surroundings import Space
+from fsid.scene.model import Background, Camera, Motion
+from fsid.scene.surroundings import space_of
 from fsid.scene.vectors import direction_of, vec3
 
 LOW_VIEW_DEG, LOW_VIEW_M = 20.0, 1.25
@@ -34,13 +35,15 @@ _SINES = 6
 def camera_rand(
     rng: np.random.Generator,
     config: CameraConfig,
-    space: Space,
+    background: Background,
     width: int,
     height: int,
-    *,
-    outdoors: bool,
 ) -> tuple[Camera, np.ndarray]:
-    """A camera inside the space, and the focus (3,) in metres, which it looks at, or above it at the sky."""
+    """A camera inside a background, and the focus (3,) in metres, which it looks at, or above it at the sky.
+
+    One that stands in the hills stands as much higher as they are there.
+    """
+    space, outdoors = space_of(background), background.kind == "open-air"
     sky_rng = rng.spawn(1)[0]
     skyward, horizon = outdoors and sky_rng.random() < config.skyward_share, sky_rng.uniform(*config.skyward)
     focus = np.array([0.0, 0.0, rng.uniform(0.2, 0.5)])
@@ -51,6 +54,8 @@ def camera_rand(
         distance = max(distance, LOW_VIEW_M / np.cos(np.radians(elevation_deg)))
     direction = direction_of(azimuth_deg, elevation_deg)
     position = focus + direction * space.reach(focus, direction, distance)
+    if outdoors:
+        position[2] += ground_height_m(background.size_m, position[0], position[1])
     target = focus + rng.normal(0, 0.12, 3) * np.linalg.norm(position - focus)
     roll, fov_deg = np.radians(rng.normal(0, config.roll_deg)), float(rng.uniform(*config.fov_deg))
     if skyward:
