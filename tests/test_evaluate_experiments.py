@@ -88,6 +88,7 @@ def test_folders_and_cameras_are_taken_as_named(photos: Path, tmp_path: Path):
     data = _data(tmp_path, config, PHOTOGRAPHS, partial(progress_bar, quiet=True), workers=1)
     generated = read_yaml(data / "config.yaml")["generate"]
     assert (generated["images"], generated["cameras"]) == (str(folder), [str(camera)])
+    assert min(generated["width"], generated["height"]) > max(config.width, config.height)  # never cut small
 
 
 @pytest.mark.parametrize(

@@ -51,8 +51,8 @@ def experiment(
         steps: Training steps.
         network: Training configuration, built-in name or file.
         seeds: One training per source and seed.
-        width: Width of a training frame in pixels.
-        height: Height of a training frame in pixels.
+        width: Width of a training frame in pixels; photographs are cut to no less than 1024.
+        height: Height of a training frame in pixels; photographs likewise.
         camera: Noise profile of all data and tests.
         set: Settings of the scenes, key=value, as for fsid generate.
         workers: Processes that render.

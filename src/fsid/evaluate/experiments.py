@@ -49,6 +49,8 @@ SOURCES: dict[Kind, tuple[str, ...]] = {
     "ablation": VARIANTS,
     "real-vs-synthetic": (PHOTOGRAPHS, SCENES, DEAD_LEAVES),
 }
+_PHOTOGRAPH_PX = 1024
+"""Windows of photographs are at least so large: small frames suit scenes, but would only cut pictures."""
 MATERIALS_SET = "materials"
 TEST_ISOS = (800, 1600, 3200, 6400)
 
@@ -57,11 +59,11 @@ TEST_ISOS = (800, 1600, 3200, 6400)
 class ExperimentConfig:
     """One experiment: with its folder of photographs, everything that its result depends on.
 
-    count: pairs per source, width x height pixels each (photographs: at least every one of the folder, as
-    large as it is). steps: of every training, 0 takes those of the configuration `network` (a built-in name
-    or a YAML file). seeds: one training per source and seed. photos: folder to train the real rival on.
-    tests: folders of photographs to measure on, beside the simulated materials (materials_scenes pictures of
-    each, test_width x test_height).
+    count: pairs per source, width x height pixels each (photographs: at least every one of the folder, and
+    windows of at least 1024 pixels a side where they have them). steps: of every training, 0 takes those of
+    the configuration `network` (a built-in name or a YAML file). seeds: one training per source and seed.
+    photos: folder to train the real rival on. tests: folders of photographs to measure on, beside the
+    simulated materials (materials_scenes pictures of each, test_width x test_height).
     settings: `key=value` of the generator, for every source of scenes.
     """
 
@@ -113,7 +115,7 @@ def scale_config(kind: Kind, scale: str) -> ExperimentConfig:
             test_width=96, test_height=96, train_settings=tiny,
         )  # fmt: skip
     if scale == "cpu":
-        return ExperimentConfig(kind, 200, 6000, "nafnet-tiny", (0, 1), 640, 360, photos=photos)
+        return ExperimentConfig(kind, 800, 6000, "nafnet-tiny", (0, 1), 480, 270, photos=photos)
     if scale == "paper":
         return ExperimentConfig(kind, 175_000, 0, "paper", (0, 1), 1920, 1080, photos=photos)
     raise FsidError(f"--scale {scale}: choose smoke, cpu or paper")
@@ -174,9 +176,10 @@ def _count(config: ExperimentConfig, source: str) -> int:
 
 
 def _generator(out: Path, config: ExperimentConfig, source: str) -> GenerateConfig:
+    least = _PHOTOGRAPH_PX if source == PHOTOGRAPHS else 0
     overrides: list[Override] = [
-        ("width", config.width),
-        ("height", config.height),
+        ("width", max(config.width, least)),
+        ("height", max(config.height, least)),
         ("cameras", [config.camera]),
     ]
     if source in VARIANTS:
