@@ -14,7 +14,8 @@ is what the PSNR of whole pictures goes by. In the first a plain patch counts as
 they part where a change helps plain ground at the cost of detail.
 
 Unlike the gradient's first order this sees what a change costs as well, but still only where a training of
-that length would go. Train to know (docs/rounds.md).
+that length would go, and nothing of how fast a network learns from nothing: frames of 1920x1080 are as good
+here as those of 960x540, and train worse (docs/rounds/size-of-frames.md). Train to know (docs/rounds.md).
 """
 
 from __future__ import annotations
