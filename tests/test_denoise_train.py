@@ -7,6 +7,7 @@ import json
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -255,6 +256,43 @@ def test_a_run_stays_with_its_dataset(has_settings: bool, tmp_path: Path) -> Non
     older = [{key: row[key] for key in row if key != "data"} for row in json.loads(sessions.read_text())]
     sessions.write_text(json.dumps(older))
     train(other, run, one, quiet=True)
+
+
+def test_fine_tuning_starts_from_a_network_and_says_so(data: Path, tmp_path: Path) -> None:
+    """Steps at no rate keep the weights; a run goes on after the network it started from is gone."""
+    first = train(data, tmp_path / "first", replace(CONFIG, seed=3), quiet=True)
+    before = load_file(first)
+    still = replace(CONFIG, initial_weights=str(tmp_path / "first"), learning_rate=1e-30, steps=3)
+    after = load_file(train(data, tmp_path / "still", still, quiet=True))
+    for name, tensor in before.items():
+        torch.testing.assert_close(after[name], tensor, rtol=0, atol=1e-7)
+    moved = replace(still, learning_rate=1e-3)
+    whole = train(data, tmp_path / "whole", moved, quiet=True).read_bytes()
+    with pytest.raises(KeyboardInterrupt):
+        train(data, tmp_path / "run", moved, progress=interrupted_after(2))
+    first.unlink()
+    assert train(data, tmp_path / "run", moved, resume=True, quiet=True).read_bytes() == whole
+    card = load_denoiser(tmp_path / "run").card
+    assert card.training == f"4 images of {data.name} after 4 images of {data.name}"
+    assert card.details["initial"]["details"]["config"]["seed"] == 3
+
+
+def interrupted_after(steps: int) -> Callable[[int, int], None]:
+    def progress(done: int, total: int) -> None:
+        if done == steps:
+            raise KeyboardInterrupt
+
+    return progress
+
+
+def test_fine_tuning_refuses_a_network_of_another_size(data: Path, tmp_path: Path) -> None:
+    first = train(data, tmp_path / "first", replace(CONFIG, steps=1), quiet=True)
+    larger = replace(CONFIG, initial_weights=str(first), network=replace(CONFIG.network, width=8))
+    with pytest.raises(FsidError, match=r"initial_weights: .*width=4.*width=8.*--config"):
+        train(data, tmp_path / "run", larger, quiet=True)
+    with pytest.raises(FsidError, match="nowhere"):
+        train(data, tmp_path / "run", replace(CONFIG, initial_weights="nowhere"), quiet=True)
+    assert not (tmp_path / "run").exists()
 
 
 def test_learning_rate_rises_and_falls() -> None:

@@ -17,7 +17,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from contextlib import nullcontext
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -31,8 +31,9 @@ from fsid.dataset.index import identity
 from fsid.dataset.loader import Batch, PatchConfig, PatchDataset
 from fsid.denoise.board import Board
 from fsid.denoise.checkpoint import TrainState, load_checkpoint, save_checkpoint
+from fsid.denoise.initial import INITIAL_FILE, initial_network, keep_initial
 from fsid.denoise.live import LiveLine
-from fsid.denoise.model import MODEL_FILE, ModelCard, save_model
+from fsid.denoise.model import MODEL_FILE, Denoiser, ModelCard, save_model
 from fsid.denoise.raw_denoiser import RawDenoiser
 from fsid.denoise.sessions import Session, read_sessions
 from fsid.denoise.stabilise import stabilise
@@ -75,18 +76,20 @@ def train(
     patches = PatchDataset(data_dir, _patch_config(config, len(kept)), config.seed, accelerator.process_index)
     if resume and is_main and not (run_dir / CONFIG_FILE).is_file():
         raise FsidError(f"{run_dir}: holds no training to resume")
+    initial = initial_network(run_dir, config)
     with held(run_dir, "another fsid train is at work in it") if is_main else nullcontext():
         with accelerator.main_process_first():
-            _prepare_run(data_dir, run_dir, config)
+            _prepare_run(data_dir, run_dir, config, initial)
         torch.manual_seed(config.seed)
-        net, optimizer = _prepare(accelerator, config)
+        net, optimizer = _prepare(accelerator, config, initial)
         bare = accelerator.unwrap_model(net)
         state = load_checkpoint(run_dir, bare, optimizer)
         forward = torch.compile(net) if _compiles(config) else net
         feed = batches(patches, range(state.step, config.steps), config.loader_processes, pin=gpu)
         shown = is_main and not quiet and progress is None
         with LiveLine(config, state.step, accelerator.num_processes, quiet=not shown) as live:
-            keeper = _Keeper(data_dir, run_dir, config, accelerator, patches.mosaics, command, state, live)
+            card = _card(data_dir, config, patches.mosaics, initial)
+            keeper = _Keeper(data_dir, run_dir, config, accelerator, card, command, state, live)
             for batch in feed:
                 rate = learning_rate(config, state.step)
                 loss, psnr = _step(accelerator, forward, net, optimizer, batch, rate, config)
@@ -112,7 +115,7 @@ class _Keeper:
         run_dir: Path,
         config: TrainConfig,
         accelerator: Accelerator,
-        images: int,
+        card: ModelCard,
         command: str,
         state: TrainState,
         live: LiveLine,
@@ -120,8 +123,7 @@ class _Keeper:
         main = accelerator.is_main_process
         self._run_dir, self._config, self._state, self._live = run_dir, config, state, live
         self._validation = validation(held_out(data_dir, config) if main else (), config, accelerator.device)
-        self._training = f"{images} images of {data_dir.resolve().name}"
-        self._data = read_yaml(data_dir / CONFIG_FILE) if (data_dir / CONFIG_FILE).is_file() else {}
+        self._card = card
         self._session = Session(run_dir, command, state.step, accelerator.num_processes, identity(data_dir))
         self._board = Board(run_dir, state.step, wanted=config.tensorboard and main)
 
@@ -165,18 +167,27 @@ class _Keeper:
         self._session.save(state.step)
 
     def _model(self, name: str) -> None:
-        state, config = self._state, self._config
-        details = {
-            "config": to_plain(config),
-            "data": self._data,
+        state = self._state
+        results = {
             "step": state.step,
             "torch": torch.__version__,
             "last": state.history[-1:],
             "validation": state.validation[-1:],
         }
-        card = ModelCard(config.network, config.patch_px, self._training, details)
+        card = replace(self._card, details={**self._card.details, **results})
         sessions = {"sessions": read_sessions(self._run_dir)}
         save_model(self._run_dir / name, state.average, card, sessions)
+
+
+def _card(data_dir: Path, config: TrainConfig, images: int, initial: Denoiser | None) -> ModelCard:
+    """The card of the network to come, without results."""
+    file = data_dir / CONFIG_FILE
+    training = f"{images} images of {data_dir.resolve().name}"
+    details = {"config": to_plain(config), "data": read_yaml(file) if file.is_file() else {}}
+    if initial is not None:
+        training += f" after {initial.card.training}"
+        details["initial"] = to_plain(initial.card)
+    return ModelCard(config.network, config.patch_px, training, details)
 
 
 def load_history(run_dir: Path) -> tuple[list[int], list[float], list[float]]:
@@ -213,11 +224,11 @@ def mean_psnr(estimate: Tensor, clean: Tensor) -> Tensor:
     return -10 * torch.log10((estimate - clean).square().mean((1, 2, 3)) + 1e-12).mean()
 
 
-def _prepare_run(data_dir: Path, run_dir: Path, config: TrainConfig) -> None:
+def _prepare_run(data_dir: Path, run_dir: Path, config: TrainConfig, initial: Denoiser | None) -> None:
     """`run_dir` is of `config` and data, whatever a run that failed before its first network left there."""
     file = run_dir / CONFIG_FILE
     there = load_settings(TrainConfig, file) if file.is_file() else None
-    if there is not None and any(run_dir.glob("*.safetensors")):
+    if there is not None and any(path.name != INITIAL_FILE for path in run_dir.glob("*.safetensors")):
         old, new = asdict(there), asdict(config)
         if changed := [key for key in new if new[key] != old[key]]:
             raise FsidError(
@@ -234,6 +245,7 @@ def _prepare_run(data_dir: Path, run_dir: Path, config: TrainConfig) -> None:
     try:
         run_dir.mkdir(parents=True, exist_ok=True)
         save_settings(config, file)
+        keep_initial(run_dir, initial)
     except OSError as error:
         raise FsidError(f"{run_dir}: cannot be written ({error.strerror})") from None
 
@@ -253,8 +265,12 @@ def _compiles(config: TrainConfig) -> bool:
     return config.compile == "on" or (config.compile == "auto" and torch.cuda.is_available())
 
 
-def _prepare(accelerator: Accelerator, config: TrainConfig) -> tuple[torch.nn.Module, torch.optim.Optimizer]:
+def _prepare(
+    accelerator: Accelerator, config: TrainConfig, initial: Denoiser | None
+) -> tuple[torch.nn.Module, torch.optim.Optimizer]:
     net = RawDenoiser(config.network)
+    if initial is not None:
+        net.load_state_dict(initial.net.state_dict())
     optimizer = torch.optim.AdamW(
         net.parameters(),
         lr=config.learning_rate,

@@ -21,19 +21,22 @@ _MAX_THREADS = 1024  # a system that runs out of them fails anywhere, with messa
 class TrainConfig:
     """How to train.
 
-    network: size of the NAFNet. steps: of the optimizer. batch: patches per step and process. patch_px: side
-    of a patch in packed pixels (the mosaic patch has twice that). learning_rate: peak; final_rate: end of the
-    cosine as a share of it. warmup_steps: linear rise. betas, weight_decay: of AdamW. clip_norm: largest
-    gradient norm. ema_decay: of the moving average of the weights, which is the model that is kept. profiles:
-    cameras whose noise is drawn, by name or file. iso_min, iso_max: log-uniform range. held_out: images at
-    the end of the dataset that are for validation, at most a fifth of it. validate_every: steps.
-    validation_photos: a folder of photographs to validate on as well ("" for none). seed: of weights,
-    patches and noise. log_every, checkpoint_every: steps. tensorboard: write its logs, where it is installed.
-    compile: the network with torch.compile; auto does on a GPU. threads: of PyTorch on a CPU, 0 leaves its
-    own choice. loader_processes: extra processes that prepare batches (0: none, right on a CPU).
+    network: size of the NAFNet. initial_weights: a network to start from (fine-tuning), as a run folder,
+    a file or the name of a shipped one; "" starts from random weights. steps: of the optimizer. batch:
+    patches per step and process. patch_px: side of a patch in packed pixels (the mosaic patch has twice
+    that). learning_rate: peak; final_rate: end of the cosine as a share of it. warmup_steps: linear rise.
+    betas, weight_decay: of AdamW. clip_norm: largest gradient norm. ema_decay: of the moving average of
+    the weights, which is the model that is kept. profiles: cameras whose noise is drawn, by name or file.
+    iso_min, iso_max: log-uniform range. held_out: images at the end of the dataset that are for
+    validation, at most a fifth of it. validate_every: steps. validation_photos: a folder of photographs
+    to validate on as well ("" for none). seed: of weights, patches and noise. log_every,
+    checkpoint_every: steps. tensorboard: write its logs, where it is installed. compile: the network with
+    torch.compile; auto does on a GPU. threads: of PyTorch on a CPU, 0 leaves its own choice.
+    loader_processes: extra processes that prepare batches (0: none, right on a CPU).
     """
 
     network: NetworkConfig = field(default_factory=NetworkConfig)
+    initial_weights: str = ""
     steps: int = 200_000
     batch: int = 16
     patch_px: int = 64
