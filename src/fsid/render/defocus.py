@@ -12,7 +12,8 @@ disc, a quarter of its diameter. Exact is the mean of many images seen from plac
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import convolve1d, gaussian_filter1d
+
+from fsid.render.blur import blurred, gaussian_weights
 
 _SIGMA_PX = np.array([0.0, 0.3, 0.5, 0.85, 1.4, 2.4, 4.0, 6.8, 11.5, 20.0])
 """Standard deviations of the layers; what lies between two is shared so that its variance is right."""
@@ -23,7 +24,7 @@ _COARSE_PX = 1.6
 """From this standard deviation on half the resolution holds all that is left."""
 _COARSE_VARIANCE = 1.0
 """Of halving (1/4) and doubling (3/4) alone, pixels squared."""
-_TRUNCATE, _NONE = 3.0, 1e-6
+_NONE = 1e-6
 
 
 def defocus(
@@ -39,7 +40,7 @@ def defocus(
     seen = np.zeros((4, *depth.shape), np.float32)  # what lies behind the next layer: light * known, known
     for layer in range(int(np.floor(place.min())), int(np.ceil(place.max())) + 1):
         sigma_px = float(_SIGMA_PX[abs(layer)])
-        window = _window(np.abs(place - layer) < 1, int(np.ceil(_TRUNCATE * sigma_px)) + 4)
+        window = _window(np.abs(place - layer) < 1, int(np.ceil(3 * sigma_px)) + 4)
         if window is None:
             continue
         ahead = place[window] - np.float32(layer)
@@ -93,13 +94,9 @@ def _blurred(image: np.ndarray, sigma_px: float) -> np.ndarray:
     if sigma_px >= _COARSE_PX and min(image.shape) >= 64:
         left = np.sqrt(sigma_px**2 - _COARSE_VARIANCE)
         return _finer(_blurred(_halved(image), float(left) / 2), image.shape)
-    for axis in (0, 1):
-        if sigma_px < _SHORT_PX:  # a sampled Gaussian would be too narrow
-            side = sigma_px**2 / 2
-            image = convolve1d(image, (side, 1 - 2 * side, side), axis=axis, mode="nearest")
-        else:
-            image = gaussian_filter1d(image, sigma_px, axis=axis, mode="nearest", truncate=_TRUNCATE)
-    return image
+    if sigma_px < _SHORT_PX:  # a sampled Gaussian would be too narrow
+        return blurred(image, np.array([1 - sigma_px**2, sigma_px**2 / 2]))
+    return blurred(image, gaussian_weights(sigma_px))
 
 
 def _halved(image: np.ndarray) -> np.ndarray:
@@ -111,6 +108,5 @@ def _halved(image: np.ndarray) -> np.ndarray:
 
 def _finer(image: np.ndarray, size: tuple[int, int]) -> np.ndarray:
     """Twice as large, linearly interpolated, cut to `size`."""
-    for axis in (0, 1):
-        image = convolve1d(np.repeat(image, 2, axis), (0.25, 0.5, 0.25), axis=axis, mode="nearest")
-    return image[: size[0], : size[1]]
+    twice = np.repeat(np.repeat(image, 2, 0), 2, 1)
+    return blurred(twice, np.array([0.5, 0.25]))[: size[0], : size[1]]

@@ -13,30 +13,25 @@ denoiser makes of either.
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
 
+from fsid.render.blur import blurred, gaussian_weights
 from fsid.scene.model import Camera
 
-_TRUNCATE = 3.0  # standard deviations; beyond lie 0.3 % of the light
 _SHARPENED_PX = 1.0
 _MOST = 0.5
 """Of its own light a pixel gains or loses so much at most, so that lamps have no black rings."""
 
 
 def set_sharpness(radiance: np.ndarray, camera: Camera) -> None:
-    """Make `radiance` (H, W, 3) as soft and as sharpened as the camera's pictures are: in place, colour by
-    colour, since a frame needs the most memory about here."""
+    """Make `radiance` (H, W, 3) as soft and as sharpened as the camera's pictures are: in place."""
     if camera.softness_px == camera.sharpening == 0:
         return
-    for colour in range(radiance.shape[2]):
-        radiance[..., colour] = sharpen(soften(radiance[..., colour], camera.softness_px), camera.sharpening)
+    radiance[:] = sharpen(soften(radiance, camera.softness_px), camera.sharpening)
 
 
 def soften(radiance: np.ndarray, softness_px: float) -> np.ndarray:
     """`radiance` (H, W, ...) through a Gaussian of standard deviation `softness_px` pixels; 0 leaves it."""
-    for axis in (0, 1) if softness_px > 0 else ():
-        radiance = gaussian_filter1d(radiance, softness_px, axis=axis, mode="nearest", truncate=_TRUNCATE)
-    return radiance
+    return blurred(radiance, gaussian_weights(softness_px)) if softness_px > 0 else radiance
 
 
 def sharpen(radiance: np.ndarray, amount: float) -> np.ndarray:
@@ -44,5 +39,8 @@ def sharpen(radiance: np.ndarray, amount: float) -> np.ndarray:
     if amount == 0:
         return radiance
     detail = radiance - soften(radiance, _SHARPENED_PX)
+    detail *= np.float32(amount)
     most = np.float32(_MOST) * radiance
-    return radiance + np.clip(np.float32(amount) * detail, -most, most)
+    np.clip(detail, -most, most, out=detail)
+    detail += radiance
+    return detail
