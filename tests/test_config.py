@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from fsid.config import from_plain, load_settings, save_settings
+from fsid.config import Override, from_plain, load_settings, save_settings
 from fsid.errors import FsidError
 
 
@@ -116,3 +116,17 @@ def test_what_has_no_keys_is_no_settings(plain: object):
 def test_a_missing_file_is_named(tmp_path: Path):
     with pytest.raises(FsidError, match=r"none\.yaml"):
         load_settings(Outer, tmp_path / "none.yaml")
+
+
+def test_a_refusal_says_where_the_value_came_from(tmp_path: Path) -> None:
+    """A command's own options are handed over as pairs; nobody wrote --set for these."""
+    file = tmp_path / "mine.yaml"
+    file.write_text("{}")
+    wrong: list[tuple[Path | None, list[Override], str]] = [
+        (None, [("count", "x")], "options: count"),
+        (None, ["count=x"], "--set: count"),
+        (file, ["count=x", ("wide", True)], "mine.yaml and --set and options: count"),
+    ]
+    for config, overrides, named in wrong:
+        with pytest.raises(FsidError, match=named):
+            load_settings(Outer, config, overrides)

@@ -120,16 +120,13 @@ def _first_refusal(error: BaseException) -> FsidError | None:
 
 def load_settings(kind: type[T], file: Path | None = None, overrides: Sequence[Override] = ()) -> T:
     """Settings of dataclass `kind` from an optional YAML file and overrides, of which the last wins."""
-    plain: dict[str, Any] = {}
-    source = "defaults"
-    if file is not None:
-        source = str(file)
-        plain = read_yaml(file)
+    plain = {} if file is None else read_yaml(file)
+    sources = [] if file is None else [str(file)]
     for override in overrides:
         key, value = _parse_override(override) if isinstance(override, str) else override
         _assign(plain, key.split("."), value)
-        source = f"{source} and --set" if file else "--set"
-    return from_plain(kind, plain, source=source)
+        sources.append("--set" if isinstance(override, str) else "options")
+    return from_plain(kind, plain, source=" and ".join(dict.fromkeys(sources)) or "defaults")
 
 
 def read_yaml(file: Path) -> dict[str, Any]:

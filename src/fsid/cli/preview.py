@@ -9,6 +9,7 @@ from tyro.conf import Positional
 from fsid.cli.generate import Variant
 from fsid.cli.libraries import read_mesh_folders
 from fsid.cli.progress import progress_bar
+from fsid.config import Override
 
 
 def preview(
@@ -41,9 +42,9 @@ def preview(
     from fsid.dataset import check_png, contact_sheet, dataset_config, generate_config, save_png
 
     check_png(output)
-    overrides = [*set, f"width={width}", f"height={height}"]
+    overrides: list[Override] = [*set, ("width", width), ("height", height)]
     if variant is not None:
-        overrides.append(f"variant={variant}")
+        overrides.append(("variant", variant))
     settings = generate_config(config, overrides)
     dataset_config(settings, seed)
     read_mesh_folders(settings.scene, quiet=quiet)
