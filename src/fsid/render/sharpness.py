@@ -14,19 +14,28 @@ from __future__ import annotations
 
 import numpy as np
 
-from fsid.render.blur import blurred, gaussian_weights
+from fsid.render.blur import blurred, gaussian_reach, gaussian_weights
 from fsid.scene.model import Camera
 
+_STRIP = 128  # rows
 _SHARPENED_PX = 1.0
 _MOST = 0.5
 """Of its own light a pixel gains or loses so much at most, so that lamps have no black rings."""
 
 
 def set_sharpness(radiance: np.ndarray, camera: Camera) -> None:
-    """Make `radiance` (H, W, 3) as soft and as sharpened as the camera's pictures are: in place."""
+    """Make `radiance` (H, W, 3) as soft and as sharpened as the camera's pictures are: in place, strip by
+    strip, since a frame needs the most memory about here."""
     if camera.softness_px == camera.sharpening == 0:
         return
-    radiance[:] = sharpen(soften(radiance, camera.softness_px), camera.sharpening)
+    height = len(radiance)
+    beyond = gaussian_reach(camera.softness_px) + gaussian_reach(_SHARPENED_PX)
+    sharp = np.empty_like(radiance)
+    for first in range(0, height, _STRIP):
+        start, stop = max(first - beyond, 0), min(first + _STRIP + beyond, height)
+        strip = sharpen(soften(radiance[start:stop], camera.softness_px), camera.sharpening)
+        sharp[first : first + _STRIP] = strip[first - start :][:_STRIP]
+    radiance[:] = sharp
 
 
 def soften(radiance: np.ndarray, softness_px: float) -> np.ndarray:
