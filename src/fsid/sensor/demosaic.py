@@ -14,15 +14,23 @@ import numpy as np
 from fsid.sensor.mosaic import site_offsets
 
 _PAD = 2  # the filters are 5x5; reflection without the edge pixel keeps the CFA phase
+_STRIP = 64  # rows at once, an even number: what is in between stays in the cache
 
 
 def demosaic(mosaic: np.ndarray, cfa: str) -> np.ndarray:
     """Mosaic (H, W), both even and at least 4, to camera RGB (H, W, 3) float32; measured samples are kept."""
     padded = np.pad(mosaic.astype(np.float32, copy=False), _PAD, mode="reflect")
-    planes = {(r, c): np.ascontiguousarray(padded[r::2, c::2]) for r in (0, 1) for c in (0, 1)}
-    del padded
-    red, gr, gb, blue = site_offsets(cfa)
     out = np.empty((*mosaic.shape, 3), np.float32)
+    for first in range(0, len(mosaic), _STRIP):
+        strip = out[first : first + _STRIP]
+        _demosaic(padded[first : first + len(strip) + 2 * _PAD], cfa, strip)
+    return out
+
+
+def _demosaic(padded: np.ndarray, cfa: str, out: np.ndarray) -> None:
+    """Into `out` (h, w, 3), from its mosaic with `_PAD` pixels on every side."""
+    planes = {(r, c): np.ascontiguousarray(padded[r::2, c::2]) for r in (0, 1) for c in (0, 1)}
+    red, gr, gb, blue = site_offsets(cfa)
     for (r, c), own, opposite in ((red, 0, 2), (blue, 2, 0)):
         sums = _Neighbours(planes, r, c)
         site = out[r::2, c::2]
@@ -37,7 +45,6 @@ def demosaic(mosaic: np.ndarray, cfa: str) -> np.ndarray:
         base = 5 * sums.centre - sums.diagonal
         site[..., row_channel] = (base + 4 * sums.across - sums.far_across + 0.5 * sums.far_down) / 8
         site[..., column_channel] = (base + 4 * sums.down - sums.far_down + 0.5 * sums.far_across) / 8
-    return out
 
 
 class _Neighbours:
