@@ -277,6 +277,42 @@ def test_fine_tuning_starts_from_a_network_and_says_so(data: Path, tmp_path: Pat
     assert card.details["initial"]["details"]["config"]["seed"] == 3
 
 
+def test_a_run_keeps_what_it_started_from(tmp_path: Path) -> None:
+    """From its first network on; before that another may be chosen, and nothing of the old one stays."""
+    data, rng = tmp_path / "data", np.random.default_rng(5)
+    data.mkdir()
+    write_shard(shard_path(data, 0), [stored(rng, number) for number in range(5)])
+    run, source = tmp_path / "run", tmp_path / "source.safetensors"
+    networks = [
+        train(data, tmp_path / str(seed), replace(CONFIG, seed=seed, steps=2), quiet=True).read_bytes()
+        for seed in (3, 9)
+    ]
+    source.write_bytes(networks[1])
+    config = replace(CONFIG, initial_weights=str(source), steps=4, checkpoint_every=4)
+    early = replace(config, held_out=1, validate_every=1)  # a network before the first checkpoint
+
+    def seed_of_start(name: str) -> int:
+        seed: int = load_denoiser(run / name).card.details["initial"]["details"]["config"]["seed"]
+        return seed
+
+    for settings, start in ((config, networks[1]), (early, networks[0])):
+        source.write_bytes(start)
+        with pytest.raises(KeyboardInterrupt):
+            train(data, run, settings, progress=interrupted_after(2))
+    assert seed_of_start("model.safetensors") == 3
+    source.write_bytes(networks[1])
+    train(data, run, early, quiet=True)
+    assert seed_of_start("last.safetensors") == 3
+    for moved in (config, replace(CONFIG, steps=1)):
+        run = tmp_path / f"run of {moved.steps}"
+        with pytest.raises(KeyboardInterrupt):
+            train(data, run, config, progress=interrupted_after(2))
+        source.unlink(missing_ok=True)
+        train(data, run, moved, resume=moved is config, quiet=True)
+        assert any(run.glob("initial.*")) == (moved is config)
+        source.write_bytes(networks[0])
+
+
 def interrupted_after(steps: int) -> Callable[[int, int], None]:
     def progress(done: int, total: int) -> None:
         if done == steps:

@@ -4,8 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter1d
 
 from fsid.errors import FsidError
+from fsid.render.blur import blurred, gaussian_weights
 from fsid.render.camera import lens_of
 from fsid.render.sharpness import set_sharpness, sharpen, soften
 from fsid.scene.model import Camera
@@ -24,6 +26,16 @@ def test_a_point_spreads_as_stated(softness_px):
     for axis in (0, 1):
         variance = (spread[..., 1].sum(axis=axis) / 2 * away**2).sum()
         assert np.sqrt(variance) == pytest.approx(softness_px, rel=0.04)
+
+
+@pytest.mark.parametrize("sigma_px", [0.1, 1.0, 20.0])
+@pytest.mark.parametrize("size", [(1, 1), (1, 50), (50, 1), (33, 5, 3), (70, 40, 3)])
+def test_a_blur_is_that_of_scipy_however_small_the_picture(size, sigma_px):
+    image = np.random.default_rng(2).random(size, np.float32)
+    expected = image.astype(float)
+    for axis in (0, 1):
+        expected = gaussian_filter1d(expected, sigma_px, axis=axis, mode="nearest", truncate=3.0)
+    np.testing.assert_allclose(blurred(image, gaussian_weights(sigma_px)), expected, atol=2e-6)
 
 
 def test_even_light_stays_even_up_to_the_border():
@@ -61,12 +73,14 @@ def test_sharpening_leaves_no_black_ring_around_a_lamp():
 
 
 def test_a_camera_softens_and_sharpens_its_own_pictures():
-    image = np.random.default_rng(1).random((300, 20, 3), np.float32)
-    same, both = image.copy(), image.copy()
+    image = np.random.default_rng(1).random((300, 20, 3), np.float32)  # three strips of rows
+    same = image.copy()
     set_sharpness(same, CAMERA)
     np.testing.assert_array_equal(same, image)
-    set_sharpness(both, replace(CAMERA, softness_px=0.8, sharpening=0.5))
-    np.testing.assert_array_equal(both, sharpen(soften(image, 0.8), 0.5))
+    for softness_px, sharpening in ((0.8, 0.5), (0.0, 0.5), (0.8, 0.0), (20.0, 0.5)):
+        both = image.copy()
+        set_sharpness(both, replace(CAMERA, softness_px=softness_px, sharpening=sharpening))
+        np.testing.assert_array_equal(both, sharpen(soften(image, softness_px), sharpening))
 
 
 @pytest.mark.parametrize("sharpening", [-0.1, 5.1, float("nan")])

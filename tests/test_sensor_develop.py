@@ -69,8 +69,9 @@ def _reference_demosaic(image: np.ndarray, cfa: str) -> np.ndarray:
 
 
 @cfas
-def test_demosaic_equals_the_published_filters(cfa):
-    image = np.random.default_rng(0).uniform(-0.2, 1, (10, 14)).astype(np.float32)
+@pytest.mark.parametrize("size", [(10, 14), (136, 10)])  # one strip of rows, and three
+def test_demosaic_equals_the_published_filters(cfa, size):
+    image = np.random.default_rng(0).uniform(-0.2, 1, size).astype(np.float32)
     np.testing.assert_allclose(demosaic(image, cfa), _reference_demosaic(image, cfa), atol=2e-6)
 
 

@@ -31,7 +31,7 @@ from fsid.dataset.index import identity
 from fsid.dataset.loader import Batch, PatchConfig, PatchDataset
 from fsid.denoise.board import Board
 from fsid.denoise.checkpoint import TrainState, load_checkpoint, save_checkpoint
-from fsid.denoise.initial import INITIAL_FILE, initial_network, keep_initial
+from fsid.denoise.initial import drop_initial, has_network, initial_network, keep_initial
 from fsid.denoise.live import LiveLine
 from fsid.denoise.model import MODEL_FILE, Denoiser, ModelCard, save_model
 from fsid.denoise.raw_denoiser import RawDenoiser
@@ -76,7 +76,7 @@ def train(
     patches = PatchDataset(data_dir, _patch_config(config, len(kept)), config.seed, accelerator.process_index)
     if resume and is_main and not (run_dir / CONFIG_FILE).is_file():
         raise FsidError(f"{run_dir}: holds no training to resume")
-    initial = initial_network(run_dir, config)
+    initial = initial_network(run_dir, config, resume=resume)
     with held(run_dir, "another fsid train is at work in it") if is_main else nullcontext():
         with accelerator.main_process_first():
             _prepare_run(data_dir, run_dir, config, initial)
@@ -228,7 +228,7 @@ def _prepare_run(data_dir: Path, run_dir: Path, config: TrainConfig, initial: De
     """`run_dir` is of `config` and data, whatever a run that failed before its first network left there."""
     file = run_dir / CONFIG_FILE
     there = load_settings(TrainConfig, file) if file.is_file() else None
-    if there is not None and any(path.name != INITIAL_FILE for path in run_dir.glob("*.safetensors")):
+    if there is not None and has_network(run_dir):
         old, new = asdict(there), asdict(config)
         if changed := [key for key in new if new[key] != old[key]]:
             raise FsidError(
@@ -244,8 +244,10 @@ def _prepare_run(data_dir: Path, run_dir: Path, config: TrainConfig, initial: De
         return
     try:
         run_dir.mkdir(parents=True, exist_ok=True)
+        drop_initial(run_dir)  # first: it may be of other settings
         save_settings(config, file)
-        keep_initial(run_dir, initial)
+        if initial is not None:
+            keep_initial(run_dir, initial)
     except OSError as error:
         raise FsidError(f"{run_dir}: cannot be written ({error.strerror})") from None
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fsid.render.blur import blurred, gaussian_reach, gaussian_weights
+from fsid.render.blur import blurred, gaussian_weights
 
 _SIGMA_PX = np.array([0.0, 0.3, 0.5, 0.85, 1.4, 2.4, 4.0, 6.8, 11.5, 20.0])
 """Standard deviations of the layers; what lies between two is shared so that its variance is right."""
@@ -40,7 +40,7 @@ def defocus(
     seen = np.zeros((4, *depth.shape), np.float32)  # what lies behind the next layer: light * known, known
     for layer in range(int(np.floor(place.min())), int(np.ceil(place.max())) + 1):
         sigma_px = float(_SIGMA_PX[abs(layer)])
-        window = _window(np.abs(place - layer) < 1, gaussian_reach(sigma_px) + 5)
+        window = _window(np.abs(place - layer) < 1, int(np.ceil(3 * sigma_px)) + 4)
         if window is None:
             continue
         ahead = place[window] - np.float32(layer)

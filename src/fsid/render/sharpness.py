@@ -28,14 +28,15 @@ def set_sharpness(radiance: np.ndarray, camera: Camera) -> None:
     strip, since a frame needs the most memory about here."""
     if camera.softness_px == camera.sharpening == 0:
         return
-    height = len(radiance)
     beyond = gaussian_reach(camera.softness_px) + gaussian_reach(_SHARPENED_PX)
-    sharp = np.empty_like(radiance)
-    for first in range(0, height, _STRIP):
-        start, stop = max(first - beyond, 0), min(first + _STRIP + beyond, height)
-        strip = sharpen(soften(radiance[start:stop], camera.softness_px), camera.sharpening)
-        sharp[first : first + _STRIP] = strip[first - start :][:_STRIP]
-    radiance[:] = sharp
+    rows = max(_STRIP, 4 * beyond)
+    above = radiance[:0]  # what the next strip sees of the rows before it, as they were
+    for first in range(0, len(radiance), rows):
+        strip = np.concatenate([above, radiance[first : first + rows + beyond]])
+        start, stop = len(above), min(len(above) + rows, len(strip))
+        sharp = sharpen(soften(strip, camera.softness_px), camera.sharpening)
+        radiance[first : first + rows] = sharp[start:stop]
+        above = strip[max(stop - beyond, 0) : stop]
 
 
 def soften(radiance: np.ndarray, softness_px: float) -> np.ndarray:
