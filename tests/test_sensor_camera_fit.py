@@ -216,6 +216,14 @@ def test_a_frame_counts_once_and_hidden_files_not_at_all(tmp_path, rng):
     assert {frame.iso for frame in found.frames} == {800}
 
 
+def test_a_black_level_that_dark_frames_miss_is_noted(tmp_path, rng):
+    lit = write_arrays(tmp_path / "lit", [to_dn(raw) for raw in exposures(rng, scene(), 800, 6)])
+    dark = write_arrays(tmp_path / "dark", [to_dn(raw) for raw in exposures(rng, scene(0.0), 800, 6)])
+    for stated, is_noted in ((LAYOUT.black_level, False), (LAYOUT.black_level + 6, True)):
+        found = calibrate(lit, name="x", dark=dark, layout=replace(LAYOUT, black_level=stated))
+        assert any(f"--black-level is {stated}" in note for note in found.notes) == is_noted
+
+
 def test_what_levels_contradict_is_refused(tmp_path, rng):
     lit = write_arrays(tmp_path / "lit", [to_dn(raw) for raw in exposures(rng, scene(), 800, 6)])
     dark = write_arrays(tmp_path / "dark", [to_dn(raw) for raw in exposures(rng, scene(0.0), 800, 6)])

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Literal
 from rich.console import Console
 from tyro.conf import Positional
 
+from fsid.cli.iso_notes import note_extrapolation
 from fsid.cli.libraries import read_mesh_folders
 from fsid.cli.progress import progress_bar
 from fsid.errors import FsidError
@@ -103,6 +104,7 @@ def generate(
     seed = seed or 0
     settings, workforce = generate_config(config, overrides), Workforce(workers, ray, workers_per_gpu)
     dataset_config(settings, seed)  # names what does not exist before a library of meshes is read
+    note_extrapolation(settings.cameras, *settings.iso_range, quiet=quiet)
     if not settings.images:
         read_mesh_folders(settings.scene, quiet=quiet)
     if dry_run:

@@ -11,6 +11,7 @@ from rich.console import Console
 from tyro.conf import Positional
 
 from fsid.cli.arguments import Output
+from fsid.cli.iso_notes import note_extrapolation
 from fsid.errors import FsidError
 
 
@@ -44,7 +45,9 @@ def train(
     if resume and (config != Path("nafnet-tiny") or set):
         raise FsidError("--resume: takes the settings of the run; leave out --config and --set")
     settings = train_config(output / "config.yaml" if resume else config, set)
+    is_main = os.environ.get("RANK", "0") == "0"
+    note_extrapolation(settings.profiles, settings.iso_min, settings.iso_max, quiet=quiet or not is_main)
     command = shlex.join(["fsid", *sys.argv[1:]])
     model = train_network(data, output, settings, resume=resume, quiet=quiet, command=command)
-    if not quiet and os.environ.get("RANK", "0") == "0":
+    if not quiet and is_main:
         Console(stderr=True).print(f"model: {model}", soft_wrap=True)

@@ -14,7 +14,13 @@ from fsid.sensor.light import LightLevel, dimmed, light_level
 from fsid.sensor.mosaic import bayer_crop, bayer_flip, mosaic, pack, unpack
 from fsid.sensor.noise import add_noise, level_rand, variance
 from fsid.sensor.pairs import clean_from_frame, clean_from_linear, clean_from_photo, noisy_from_clean
-from fsid.sensor.profiles import load_bayer_profile, load_profile, profile_names, save_profile
+from fsid.sensor.profiles import (
+    far_extrapolations,
+    load_bayer_profile,
+    load_profile,
+    profile_names,
+    save_profile,
+)
 from fsid.sensor.quantise import clean_levels, from_dn, quantise, to_dn
 from fsid.sensor.raw import CFA_PATTERNS, NoiseLevel, Raw
 from fsid.sensor.temporal import TemporalStatistics
@@ -53,6 +59,7 @@ __all__ = [
     "estimate_noise",
     "expose",
     "exposure_rand",
+    "far_extrapolations",
     "fit_noise",
     "from_dn",
     "level_rand",

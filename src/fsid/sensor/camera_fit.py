@@ -27,7 +27,8 @@ from fsid.sensor.terms_fit import CUT_OFF, DarkFinding, dark_finding, fit_terms,
 MIN_FRAMES = 3  # of one ISO; a variance from two is one number per pixel, and a defect looks like noise
 DARK_LEVEL = 0.05  # of the range, above which a dark frame saw light
 DARK_CONTRAST = 0.02  # of the range between blocks, above which a dark frame shows a picture
-BLACK_DIFFERS = 0.01  # of the range, from which on dark frames contradict a stated black level
+BLACK_DIFFERS = 0.01  # of the range, from which on dark frames contradict a black level that the user states
+BLACK_NOTED_DN = 1.0  # from which on it is noted, and from their own noise on
 BELOW_BLACK = 0.01  # of the pixels that may have a mean as far below the black level
 UNCERTAIN = 0.02  # relative standard error of k that deserves a note
 _METHOD = "fsid calibrate: weighted line through pooled temporal variances per CFA site (sensor/calibrate.py)"
@@ -160,19 +161,20 @@ def _pool_dark(reader: _Reader, iso: float, frames: list[Frame]) -> tuple[np.nda
             reader.cut_off.append(iso)
         samples, levels = pool_dark(stats, camera.cfa, camera.white_level, black if number > 0 else None)
         if number == 0:
-            _check_black(reader, float(levels.mean()), burst[0].path)
+            noise_dn = float(np.sqrt(np.mean([site.variance.mean() for site in samples])))
+            _check_black(reader, float(levels.mean()), noise_dn, burst[0].path)
             black = levels
         pooled.append(samples)
     return black, pooled
 
 
-def _check_black(reader: _Reader, measured: float, path: Path) -> None:
-    """A stated black level that the dark frames contradict: refused where the user states it, else noted."""
+def _check_black(reader: _Reader, measured: float, noise_dn: float, path: Path) -> None:
+    """A stated black level that dark frames contradict is noted, or refused where the user is far off."""
     camera = reader.found.camera
     stated = camera.black_level
-    if stated is None or abs(stated - measured) <= BLACK_DIFFERS * (camera.white_level - measured):
+    if stated is None or abs(stated - measured) <= max(BLACK_NOTED_DN, noise_dn):
         return
-    if camera.bare:
+    if camera.bare and abs(stated - measured) > BLACK_DIFFERS * (camera.white_level - measured):
         raise FsidError(f"{path}: dark frames of mean {measured:.1f} DN contradict --black-level {stated}")
     reader.blacks.append((stated, measured, path))
 
@@ -242,7 +244,8 @@ def _notes(reader: _Reader, isos: Sequence[float], fits: Sequence[NoiseFit]) -> 
         if paths:
             yield f"{len(paths)} bursts, the first one that of {paths[0]}: {what}"
     for stated, measured, path in reader.blacks:
-        yield f"{path}: dark frames have a mean of {measured:.1f} DN, the files' black level is {stated}"
+        source = "--black-level" if reader.found.camera.bare else "the files' black level"
+        yield f"{path}: dark frames have a mean of {measured:.1f} DN, {source} is {stated}, which is kept"
     for iso in sorted(set(reader.cut_off)):
         yield f"ISO {iso:g}: dark noise reaches DN 0 and is cut off; corrected as far as it is Gaussian"
     for iso, fit in zip(isos, fits, strict=True):

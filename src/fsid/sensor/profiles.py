@@ -12,6 +12,7 @@ beyond k and sigma2 (see `terms`); without it the model is the paper's. Own prof
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict
 from importlib.resources import files
 from itertools import pairwise
@@ -36,6 +37,7 @@ _REQUIRED = {"name", "camera", "cfa", "bits", "black_level", "white_level", "lev
 _OPTIONAL = {"source", "notes", "date", "xyz_to_camera", "law", "terms", "optics"}
 _MEASURED = {"k_error", "sigma2_error", "black", "frames", "dark_frames"}
 _LARGEST = 1e300  # of any number; beyond it are infinity and integers that are no float
+_FAR = 4.5  # times: two stops, and what tables of nominal ISOs are short of them
 _DN_TOLERANCE = 0.01  # k_dn and sigma2_dn repeat k and sigma2; they may differ by rounding only
 
 
@@ -62,6 +64,19 @@ def load_bayer_profile(name_or_path: str | Path) -> CameraProfile:
             f"{name_or_path}: is of a sensor without colour filters; give a Bayer camera's profile"
         )
     return profile
+
+
+def far_extrapolations(
+    names: Iterable[str | Path], iso_min: float, iso_max: float
+) -> Iterator[tuple[str, float, float]]:
+    """Name, first and last measured ISO of the profiles that ISOs from `iso_min` to `iso_max` exceed by far.
+
+    A stop or two beyond the table its law is believed (`iso_law`); FsidError as in `load_profile`.
+    """
+    for profile in map(load_profile, names):
+        first, last = profile.iso[0], profile.iso[-1]
+        if iso_min < first / _FAR or iso_max > last * _FAR:
+            yield profile.name, first, last
 
 
 def save_profile(path: str | Path, profile: CameraProfile) -> None:
