@@ -21,7 +21,16 @@ from fsid.denoise.export import export  # noqa: E402
 from fsid.denoise.files import denoise_file, noise_of  # noqa: E402
 from fsid.denoise.preview import PREVIEW_PX, preview_of  # noqa: E402
 from fsid.errors import FsidError  # noqa: E402
-from fsid.sensor import Layout, Raw, develop, load_profile, noisy_from_clean, read_raw, write_dng  # noqa: E402
+from fsid.sensor import (  # noqa: E402
+    Layout,
+    Raw,
+    develop,
+    load_profile,
+    noisy_from_clean,
+    read_raw,
+    save_profile,
+    write_dng,
+)
 from fsid.sensor.metadata import exposure_metadata  # noqa: E402
 
 PROFILE = load_profile("galaxy-s22")
@@ -271,3 +280,9 @@ def test_the_python_interface(noisy_file: Path, network: Path) -> None:
 def test_importing_the_package_imports_no_pytorch() -> None:
     script = "import sys, fsid; fsid.read_raw; sys.exit('torch' in sys.modules)"
     subprocess.run([sys.executable, "-c", script], check=True)
+
+
+def test_a_profile_without_colour_filters_is_refused(tmp_path: Path) -> None:
+    save_profile(tmp_path / "mono.yaml", replace(load_profile("pixel6"), cfa="MONO"))
+    with pytest.raises(FsidError, match=r"mono\.yaml: is of a sensor without colour filters"):
+        noise_of(noisy_raw(), str(tmp_path / "mono.yaml"), 800, tmp_path)

@@ -23,7 +23,16 @@ from fsid.dataset.loader import Batch, PatchConfig, PatchDataset, packed, window
 from fsid.dataset.order import shuffled  # noqa: E402
 from fsid.dataset.shards import shard_path, write_shard  # noqa: E402
 from fsid.errors import FsidError  # noqa: E402
-from fsid.sensor import CFA_PATTERNS, NoiseLevel, Raw, add_noise, load_profile, read_raw, write_dng  # noqa: E402
+from fsid.sensor import (  # noqa: E402
+    CFA_PATTERNS,
+    NoiseLevel,
+    Raw,
+    add_noise,
+    load_profile,
+    read_raw,
+    save_profile,
+    write_dng,
+)
 from fsid.sensor.noise import level_rand  # noqa: E402
 
 HEIGHT, WIDTH = 40, 60
@@ -174,6 +183,12 @@ def test_unusable_datasets_are_named(dataset: Path, tmp_path: Path) -> None:
     shard.write_bytes(shard.read_bytes()[:5000])
     with pytest.raises(FsidError, match=r"shard-00000\.tar"):
         index_mosaics(dataset)
+
+
+def test_a_profile_without_colour_filters_is_refused(dataset: Path, tmp_path: Path) -> None:
+    save_profile(tmp_path / "mono.yaml", replace(load_profile("pixel6"), cfa="MONO"))
+    with pytest.raises(FsidError, match=r"mono\.yaml: is of a sensor without colour filters"):
+        PatchDataset(dataset, PatchConfig(8, 1, (str(tmp_path / "mono.yaml"),), 100, 800), 0)
 
 
 def test_crops_of_a_frame_are_of_one_scene(tmp_path: Path) -> None:

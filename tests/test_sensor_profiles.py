@@ -10,7 +10,7 @@ import pytest
 
 from fsid.cli.iso_notes import note_extrapolation
 from fsid.errors import FsidError
-from fsid.sensor import far_extrapolations, load_profile, profile_names
+from fsid.sensor import far_extrapolated, load_profile, profile_names
 from fsid.sensor.iso_law import k_law, sigma2_law
 
 PUBLISHED = {
@@ -252,9 +252,9 @@ def test_iso_must_be_positive(iso):
 def test_a_range_far_beyond_the_measured_isos_is_noted_and_two_stops_are_not(tmp_path, capsys):
     path = tmp_path / "mine.yaml"
     path.write_text(GOOD)
-    assert list(far_extrapolations([path, "pixel6"], 400, 8000)) == [("mine", 100, 400)]
-    assert not list(far_extrapolations([path], 25, 1600))
-    assert list(far_extrapolations(profile_names(), 100, 12800)) == []
+    assert [profile.name for profile in far_extrapolated([path, "pixel6"], 400, 8000)] == ["mine"]
+    assert not list(far_extrapolated([path], 25, 1600))
+    assert not list(far_extrapolated(profile_names(), 100, 12800))
     note_extrapolation([str(path)], 20, 400, quiet=False)
     said = " ".join(capsys.readouterr().err.split())
     assert said == (

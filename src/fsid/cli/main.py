@@ -49,6 +49,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
 
 DESCRIPTION = "RAW denoisers trained on nothing but rendered scenes: generate pairs, train, denoise, prove."
 RESUMABLE = {"generate", "train", "experiment", "demo"}
+REPEATABLE = {"--model"}  # of evaluate
 EXTRAS = {
     "torch": "train",
     "accelerate": "train",
@@ -64,6 +65,7 @@ EXTRAS = {
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run one command; exit code 0 when done, 2 when the input was bad."""
     try:
+        _check_repeated(sys.argv[1:] if arguments is None else arguments)
         tyro.extras.subcommand_cli_from_dict(
             COMMANDS,
             prog="fsid",
@@ -89,6 +91,18 @@ def main(arguments: Sequence[str] | None = None) -> None:
         hint = "; run the same command again to continue" if goes_on else ""
         Console(stderr=True).print(f"fsid: interrupted{hint}")
         sys.exit(130)
+
+
+def _check_repeated(arguments: Sequence[str]) -> None:
+    """Refuse an option that is given twice: of `--set a=1 --set b=2` the first would be lost."""
+    names = [
+        argument.partition("=")[0].replace("_", "-")
+        for argument in arguments
+        if argument.startswith("-") and argument.lstrip("-")[:1].isalpha()
+    ]
+    for name in names:
+        if names.count(name) > 1 and name not in REPEATABLE:
+            raise FsidError(f"{name}: is given twice; several values go behind one {name}")
 
 
 def _fail(line: str) -> NoReturn:

@@ -43,7 +43,7 @@ from fsid.errors import FsidError
 from fsid.sensor.formula import stored, with_noise
 from fsid.sensor.gaussian import standard_normal
 from fsid.sensor.mosaic import site_offsets
-from fsid.sensor.profiles import CameraProfile, load_profile
+from fsid.sensor.profiles import CameraProfile, load_bayer_profile
 from fsid.sensor.quantise import ROUNDING_DN2
 from fsid.sensor.raw import NoiseLevel
 
@@ -100,7 +100,7 @@ class PatchDataset(Dataset[Batch]):
             raise FsidError(f"rank {rank}: is not one of the {self._world} processes that train together")
         self._mosaics = _training_mosaics(data_dir, config)
         self._noisy = _noisy_of(data_dir, self._mosaics) if config.noise == "stored" else {}
-        self._profiles = [load_profile(name) for name in config.profiles]
+        self._profiles = [load_bayer_profile(name) for name in config.profiles]
         self._levels = LevelTable(self._profiles, (config.iso_min, config.iso_max))
         self._config, self._seed = config, seed
         self._maps: OrderedDict[Path, np.ndarray] = OrderedDict()

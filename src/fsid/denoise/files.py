@@ -18,7 +18,7 @@ from fsid.sensor import (
     Raw,
     clean_levels,
     estimate_noise,
-    load_profile,
+    load_bayer_profile,
     read_raw,
     write_dng,
 )
@@ -77,7 +77,7 @@ def noise_of(raw: Raw, profile: str | None, iso: float | None, path: Path) -> No
         iso = iso if iso is not None else raw.iso
         if not iso > 0:
             raise FsidError(f"{path}: its ISO is unknown, give --iso with a number above 0")
-        return Noise(load_profile(profile).level(iso), f"profile {profile} at ISO {iso:g}")
+        return Noise(load_bayer_profile(profile).level(iso), f"profile {profile} at ISO {iso:g}")
     if iso is not None:
         raise FsidError("--iso: names a level of a camera; give --profile too (fsid profiles lists them)")
     if raw.noise is not None:

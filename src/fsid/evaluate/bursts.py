@@ -24,6 +24,7 @@ from skimage.registration import phase_cross_correlation
 
 from fsid.errors import FsidError
 from fsid.evaluate.testset import Progress, TestImage, TestSet, staged, write_testset
+from fsid.files import write_atomically
 from fsid.sensor import NoiseLevel, Raw, clean_levels, estimate_noise, load_profile, pack, read_raw, write_dng
 
 OUTLIER_SIGMA = 4.0
@@ -113,7 +114,7 @@ def burst_testset(
         images = tuple(TestImage(scene, scene) for scene in scenes)
         testset = TestSet(name, levels, images, 0, "captured bursts, truth by robust averaging", frames)
         write_testset(root, testset)
-        (root / "truth.csv").write_text(_csv(qualities), encoding="utf-8")
+        write_atomically(root / "truth.csv", _csv(qualities).encode())
     return testset, qualities
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, astuple, dataclass, fields
@@ -17,6 +18,7 @@ from fsid.errors import FsidError
 from fsid.evaluate.classical import denoise_classical
 from fsid.evaluate.metrics import psnr, ssim
 from fsid.evaluate.testset import ALL_SETS, TestImage, TestSet, read_testset
+from fsid.files import write_atomically
 from fsid.sensor import Raw, develop, read_raw, upright
 
 
@@ -158,16 +160,17 @@ def write_results(rows: Sequence[Row], file: Path) -> None:
         return round(value, 4) if np.isfinite(value) else None
 
     plain_rows = [{key: plain(value) for key, value in asdict(row).items()} for row in rows]
-    file.write_text(json.dumps(plain_rows, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    write_atomically(file, (json.dumps(plain_rows, indent=1, allow_nan=False) + "\n").encode())
 
 
 def write_images(images: Sequence[ImageRow], file: Path) -> None:
     """Write images.csv: one line per image, level and method."""
-    with file.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(field.name for field in fields(ImageRow))
-        for row in images:
-            writer.writerow(f"{v:.4f}" if isinstance(v, float) else v for v in astuple(row))
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(field.name for field in fields(ImageRow))
+    for row in images:
+        writer.writerow(f"{v:.4f}" if isinstance(v, float) else v for v in astuple(row))
+    write_atomically(file, text.getvalue().encode())
 
 
 def confidence(values: Sequence[float]) -> float:

@@ -245,9 +245,7 @@ def _measured(
         for testset in testsets:
             with bar(f"measuring {stem.name} on {testset.name}", "captures") as progress:
                 images += compare(testset, methods, progress=progress).images
-        part = file.with_suffix(".part")
-        write_images(images, part)
-        part.replace(file)
+        write_images(images, file)
     images = _read_images(file)
     rows = [row for testset in testsets for row in summarise(read_testset(testset), methods, images)]
     return rows, images

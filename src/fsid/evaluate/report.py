@@ -20,6 +20,7 @@ from fsid.dataset.inspect_plot import as_label
 from fsid.evaluate.classical import bm3d_installed
 from fsid.evaluate.compare import Comparison, Crops, Row, confidence
 from fsid.evaluate.testset import ALL_SETS
+from fsid.files import write_atomically
 
 ERROR_GAIN = 8.0
 """Error maps show |output - truth| of the developed pictures this many times."""
@@ -67,7 +68,7 @@ def write_report(file: Path, title: str, lead: str, sections: Sequence[Section])
     template = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     source = files("fsid.evaluate").joinpath("report.html.j2").read_text(encoding="utf-8")
     page = template.from_string(source).render(title=title, lead=lead, sections=sections, version=__version__)
-    file.write_text(page, encoding="utf-8")
+    write_atomically(file, page.encode())
 
 
 def picture(srgb: np.ndarray, caption: str = "", *, pixelated: bool = False) -> Picture:

@@ -26,6 +26,7 @@ import numpy as np
 from fsid.config import from_plain, to_plain
 from fsid.dataset import find_photos, read_photo
 from fsid.errors import FsidError
+from fsid.files import write_atomically
 from fsid.sensor import (
     CameraProfile,
     Raw,
@@ -207,7 +208,7 @@ def capture(
 
 def write_testset(root: Path, testset: TestSet) -> None:
     """Write testset.json."""
-    (root / "testset.json").write_text(json.dumps(to_plain(testset), indent=1) + "\n", encoding="utf-8")
+    write_atomically(root / "testset.json", (json.dumps(to_plain(testset), indent=1) + "\n").encode())
 
 
 @contextmanager

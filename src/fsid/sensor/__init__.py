@@ -15,7 +15,7 @@ from fsid.sensor.mosaic import bayer_crop, bayer_flip, mosaic, pack, unpack
 from fsid.sensor.noise import add_noise, level_rand, variance
 from fsid.sensor.pairs import clean_from_frame, clean_from_linear, clean_from_photo, noisy_from_clean
 from fsid.sensor.profiles import (
-    far_extrapolations,
+    far_extrapolated,
     load_bayer_profile,
     load_profile,
     profile_names,
@@ -59,7 +59,7 @@ __all__ = [
     "estimate_noise",
     "expose",
     "exposure_rand",
-    "far_extrapolations",
+    "far_extrapolated",
     "fit_noise",
     "from_dn",
     "level_rand",

@@ -66,17 +66,14 @@ def load_bayer_profile(name_or_path: str | Path) -> CameraProfile:
     return profile
 
 
-def far_extrapolations(
-    names: Iterable[str | Path], iso_min: float, iso_max: float
-) -> Iterator[tuple[str, float, float]]:
-    """Name, first and last measured ISO of the profiles that ISOs from `iso_min` to `iso_max` exceed by far.
+def far_extrapolated(names: Iterable[str | Path], iso_min: float, iso_max: float) -> Iterator[CameraProfile]:
+    """Those profiles whose measured ISOs a range from `iso_min` to `iso_max` exceeds by more than two stops.
 
-    A stop or two beyond the table its law is believed (`iso_law`); FsidError as in `load_profile`.
+    So far the law beyond the table is believed (`iso_law`). FsidError as in `load_profile`.
     """
     for profile in map(load_profile, names):
-        first, last = profile.iso[0], profile.iso[-1]
-        if iso_min < first / _FAR or iso_max > last * _FAR:
-            yield profile.name, first, last
+        if iso_min < profile.iso[0] / _FAR or iso_max > profile.iso[-1] * _FAR:
+            yield profile
 
 
 def save_profile(path: str | Path, profile: CameraProfile) -> None:

@@ -74,7 +74,10 @@ class ReferenceRenderer:
             raise FsidError(f"camera_index {camera_index}: the scene has {len(scene.cameras)} cameras")
         camera = scene.cameras[camera_index]
         if camera.distortion is not None or any(camera.chromatic_aberration):
-            raise FsidError("scene.cameras: the reference renderer has no lens distortion; set it to null")
+            raise FsidError(
+                "the reference renderer has neither lens distortion nor fringes; draw scenes without: "
+                "--set scene.lens.distortion_share=0 scene.lens.fisheye_share=0 scene.lens.fringe_share=0"
+            )
         still = not (camera.exposure_s and (scene.motions or _moves(camera)))
         steps = 1 if still else _SHUTTER_STEPS
         prepared = self.prepare(scene, camera)
