@@ -6,7 +6,7 @@ The image is cut into layers of like blur; each is blurred and laid over those b
 all that is not farther covers, so a surface across several layers has no seams. What a near thing hides is
 not known, so it is continued from beside it; and the blur is a Gaussian with the standard deviation of the
 disc, a quarter of its diameter. Exact is the mean of many images seen from places on the lens
-(`fsid.render.exposure`); docs/results.md has how far both are apart.
+(`fsid.render.exposure`); docs/results/renderer.md has how far both are apart.
 """
 
 from __future__ import annotations

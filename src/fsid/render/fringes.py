@@ -4,7 +4,7 @@
 
 Both are interpolated in the image that green sees, drawn with a margin from which the edges of a smaller one
 come: by Lanczos' kernel along rows, then columns, within a quarter of the values around (no black rings).
-Labels are green's. docs/results.md has what that costs beside shading every colour anew.
+Labels are green's. docs/results/renderer.md has what that costs beside shading every colour anew.
 """
 
 from __future__ import annotations
