@@ -138,6 +138,20 @@ def test_more_samples_are_less_noise_and_the_seed_is_all_of_it():
     assert few[0].mean() == pytest.approx(many[0].mean(), rel=0.05)
 
 
+def test_fringes_magnify_red_and_blue_alone():
+    camera = replace(DOWN, width=64, height=48, chromatic_aberration=(-0.04, 0.04))
+    light = Light("spot", (0.0, 0.0, 1.5), (0.0, 0.0, -1.0), (2.0, 2.0, 2.0), 0.0, 50.0)
+    plain, fringed = (
+        renderer(64).render(empty_room(light, camera=each))
+        for each in (replace(camera, chromatic_aberration=(0.0, 0.0)), camera)
+    )
+    lit = np.array([(frame.radiance > 0.1 * frame.radiance.max()).sum((0, 1)) for frame in (plain, fringed)])
+    assert lit[0, 1] > 300
+    np.testing.assert_allclose(lit[1] / lit[0], (0.96**2, 1.0, 1.04**2), atol=0.03)
+    assert fringed.albedo.shape == fringed.normal.shape == fringed.radiance.shape == (48, 64, 3)
+    np.testing.assert_allclose(fringed.depth, plain.depth, rtol=1e-3)
+
+
 def test_what_mitsuba_cannot_do_is_said():
     bent = replace(DOWN, distortion=Distortion("brown-conrady", (0.1, 0.0, 0.0, 0.0, 0.0)))
     with pytest.raises(FsidError, match="distortion"):

@@ -58,11 +58,16 @@ def _enlarged(camera: Camera, margin: int) -> Camera:
     )
 
 
+def inside(camera: Camera, margin: int) -> tuple[slice, slice]:
+    """Where the image of `camera` lies in that of the camera `with_margin`."""
+    return slice(margin, margin + camera.height), slice(margin, margin + camera.width)
+
+
 def magnified(radiance: np.ndarray, camera: Camera, margin: int) -> np.ndarray:
     """The (H, W, 3) image of `camera` from `radiance`, that of the camera `with_margin`."""
     if not any(camera.chromatic_aberration):
         return radiance
-    inner = radiance[margin : margin + camera.height, margin : margin + camera.width].copy()
+    inner = radiance[inside(camera, margin)].copy()
     for colour, growth in zip((0, 2), camera.chromatic_aberration, strict=True):
         plane = np.ascontiguousarray(radiance[..., colour])
         rows, columns = (_places(size, growth) + margin for size in (camera.height, camera.width))

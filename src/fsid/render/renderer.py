@@ -30,7 +30,7 @@ from fsid.render.drawable import View, view_of
 from fsid.render.exposure import Shot, is_moving, shots_of
 from fsid.render.flow import flow_between
 from fsid.render.frame import Frame
-from fsid.render.fringes import magnified, with_margin
+from fsid.render.fringes import inside, magnified, with_margin
 from fsid.render.layers import Layer, LayerStore, fitting_size
 from fsid.render.mirror import MOST, Mirror, clearest_mirror, ground_mirror
 from fsid.render.occlusion_pass import OcclusionPass
@@ -201,9 +201,8 @@ class Renderer:
         radiance = magnified(radiance, asked, margin)
         set_sharpness(radiance, asked)
         set_colour_contrast(radiance, asked)
-        inner = (slice(margin, margin + asked.height), slice(margin, margin + asked.width))
         labels_of = (frame.albedo, frame.normal, frame.depth, frame.object_id)
-        return Frame(radiance, *(label[inner] for label in labels_of))
+        return Frame(radiance, *(label[inside(asked, margin)] for label in labels_of))
 
     def wait(self) -> None:
         """Return when everything issued so far is done; only measuring needs it."""

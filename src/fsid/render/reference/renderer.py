@@ -4,8 +4,8 @@
     labels      one ray through the middle of each pixel             free of noise
 
 Light bounces for real, so `Scene.ambient`, with which the rasteriser stands in for the walls' light, is used
-out of doors only. Lens distortion and chromatic aberration are not Mitsuba's; a camera that has them is
-refused instead of being rendered without.
+out of doors only. Lens distortion is not Mitsuba's; a camera that has it is refused instead of being rendered
+without. Fringes, sharpness and colour contrast come after the image, as the rasteriser's do.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from fsid.errors import FsidError
 from fsid.render.camera import Lens, lens_of
 from fsid.render.colour_contrast import set_colour_contrast
 from fsid.render.frame import Frame
+from fsid.render.fringes import inside, magnified, with_margin
 from fsid.render.parts import parts_of, turn
 from fsid.render.reference.bodies import Body, body_of, bsdf_of, pyramids
 from fsid.render.reference.dicing import View
@@ -72,12 +73,13 @@ class ReferenceRenderer:
         """The frame of one of the scene's cameras; `seed` changes the noise only. Raises FsidError."""
         if not 0 <= camera_index < len(scene.cameras):
             raise FsidError(f"camera_index {camera_index}: the scene has {len(scene.cameras)} cameras")
-        camera = scene.cameras[camera_index]
-        if camera.distortion is not None or any(camera.chromatic_aberration):
+        asked = scene.cameras[camera_index]
+        if asked.distortion is not None:
             raise FsidError(
-                "the reference renderer has neither lens distortion nor fringes; draw scenes without: "
-                "--set scene.lens.distortion_share=0 scene.lens.fisheye_share=0 scene.lens.fringe_share=0"
+                "the reference renderer has no lens distortion; draw scenes without: "
+                "--set scene.lens.distortion_share=0 scene.lens.fisheye_share=0"
             )
+        camera, margin = with_margin(asked)
         still = not (camera.exposure_s and (scene.motions or _moves(camera)))
         steps = 1 if still else _SHUTTER_STEPS
         prepared = self.prepare(scene, camera)
@@ -89,9 +91,11 @@ class ReferenceRenderer:
                 prepared = self.prepare(scene, _later(camera, offset))
             total += prepared.radiance(-(-self._samples // steps), seed * steps + k)
         radiance = (total / steps * _vignette(camera)[..., None]).astype(np.float32)
-        set_sharpness(radiance, camera)
-        set_colour_contrast(radiance, camera)
-        return replace(labels, radiance=radiance)
+        radiance = magnified(radiance, asked, margin)
+        set_sharpness(radiance, asked)
+        set_colour_contrast(radiance, asked)
+        labels_of = (labels.albedo, labels.normal, labels.depth, labels.object_id)
+        return Frame(radiance, *(label[inside(asked, margin)] for label in labels_of))
 
     def radiance(self, scene: Scene, camera_index: int = 0) -> np.ndarray:
         """(H, W, 3), the `radiance` of `render` alone."""
