@@ -178,7 +178,7 @@ def test_the_report_names_captures_and_shows_them_upright(clean: Raw, tmp_path: 
     _burst(tmp_path / "captures" / "fabric" / "1lux", turned)
     burst_testset(tmp_path / "captures", tmp_path / "set")
     crops = compare(tmp_path / "set", [NOISY], crop_levels=["1lux"], crop_px=200).crops[0]
-    assert crops.title == "fabric, 1lux"
+    assert (crops.image, crops.level) == ("fabric", "1lux")
     height, width = clean.mosaic.shape
     assert crops.truth.shape == crops.by_method["noisy"].shape == (width, height, 3)
 

@@ -17,8 +17,9 @@ from fsid.cli.main import main
 from fsid.errors import FsidError
 from fsid.evaluate import CLASSICAL, NOISY, Method, compare, photo_testset, psnr, read_testset, write_results
 from fsid.evaluate.compare import Row, confidence
+from fsid.evaluate.comparison_report import comparison_sections
 from fsid.evaluate.models import model_names
-from fsid.evaluate.report import comparison_sections, write_report
+from fsid.evaluate.report import METRICS, level_label, write_report
 from fsid.sensor import read_raw
 
 
@@ -111,6 +112,20 @@ def test_the_report_is_one_file_that_loads_nothing(small_set: Path, tmp_path: Pa
     assert "<script>" not in page
     noisy = next(row for row in comparison.rows if (row.model, row.level) == ("noisy", "iso800"))
     assert f"{noisy.psnr_raw:.2f}" in page
+
+
+def test_a_table_names_levels_and_marks_the_best(small_set: Path):
+    comparison = compare(small_set, [NOISY, CLASSICAL])
+    figures = comparison_sections(comparison)[0]
+    assert [table.title for table in figures.tables] == [title for _, title, _ in METRICS]
+    for table, (key, _, form) in zip(figures.tables, METRICS, strict=True):
+        assert table.head == ("", "ISO 800", "ISO 3200", "mean")
+        values = [getattr(row, key) for row in comparison.rows if row.model == "classical"]
+        assert [cell.split(" ± ")[0] for cell in table.rows[1][1:3]] == [f"{v:{form}}" for v in values]
+        assert table.rows[1][3] == f"{np.mean(values):{form}}"
+        assert table.best == {(1, 1), (1, 2), (1, 3)}
+    assert level_label("0.5lux") == "0.5 lux"
+    assert level_label("isolated") == "isolated"
 
 
 def test_names_are_text_and_nothing_else(small_set: Path, tmp_path: Path, capsys):

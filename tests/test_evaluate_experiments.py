@@ -20,7 +20,7 @@ from fsid.evaluate.compare import ImageRow
 from fsid.evaluate.dead_leaves import RADIUS_PX, dead_leaves_rand
 from fsid.evaluate.demo import DemoConfig
 from fsid.evaluate.experiment_report import gaps
-from fsid.evaluate.experiments import PHOTOGRAPHS, _data, scale_config
+from fsid.evaluate.experiments import PHOTOGRAPHS, TEST_ISOS, _data, scale_config
 from fsid.sensor import load_profile, save_profile
 
 SMOKE = ("--scale", "smoke", "--count", "2", "--steps", "3", "--quiet")
@@ -58,7 +58,14 @@ def test_synthetic_against_real_goes_on_where_it_was_stopped(photos: Path, tmp_p
     assert models == {"noisy", "classical", "photographs-seed3", "full-seed3", "dead-leaves-seed3"}
     assert {r["training"] for r in rows if r["model"] == "photographs-seed3"} == {"3 pairs from photographs"}
     assert {"0.5lux", "5lux", "iso800", "iso6400"} <= {row["level"] for row in rows}
-    assert "full - photographs" in (out / "report.html").read_text()
+    page = (out / "report.html").read_text()
+    assert "full - photographs" in page
+    assert "the paper&#39;s gap" in page
+    by = {(r["model"], r["level"]): r["psnr"] for r in rows if r["set"] == "other"}
+    isos = [f"iso{iso}" for iso in TEST_ISOS]
+    gap = [by["full-seed3", level] - by["photographs-seed3", level] for level in isos]
+    lowest = TEST_ISOS[int(np.argmin(gap))]
+    assert f"<td>{np.mean(gap):+.2f}</td><td>{min(gap):+.2f} (ISO {lowest})</td>" in page
 
     before = {p: p.stat().st_mtime_ns for p in out.rglob("*.tar")}
     (out / "measured" / "full-seed3.csv").unlink()

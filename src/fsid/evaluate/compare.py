@@ -63,7 +63,8 @@ class ImageRow:
 class Crops:
     """A window of one image at one level, developed: (h, w, 3) sRGB 0..1, by method name."""
 
-    title: str
+    image: str
+    level: str
     truth: np.ndarray
     by_method: dict[str, np.ndarray]
     psnr_raw: dict[str, float]
@@ -213,7 +214,8 @@ def _crops(
 ) -> Crops:
     window, _ = detailed_window(truth, size)
     return Crops(
-        f"{image.name}, {level}",
+        image.name,
+        level,
         upright(truth[window], orientation),
         {name: upright(output[window], orientation) for name, output in outputs.items()},
         psnr_raw,

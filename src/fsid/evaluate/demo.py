@@ -43,9 +43,10 @@ from fsid.evaluate.compare import (
     detailed_window,
     write_results,
 )
+from fsid.evaluate.comparison_report import comparison_sections
 from fsid.evaluate.models import model_method
 from fsid.evaluate.plots import loss_plot, noise_profile_plot
-from fsid.evaluate.report import Section, comparison_sections, picture, write_report
+from fsid.evaluate.report import Section, picture, write_report
 from fsid.evaluate.testset import photo_testset
 from fsid.sensor import NoiseLevel, develop, load_profile, read_mosaic, read_raw
 

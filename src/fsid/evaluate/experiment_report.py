@@ -1,28 +1,33 @@
-"""The report of an experiment: a table per test set, and the gaps that the experiment is about.
+"""The report of an experiment: where "full" stands beside its rivals, then a section per test set.
 
-    gap(source, rival) = median over images of PSNR(source) - PSNR(rival),   per level and seed
+    gap(rival) = mean over images and seeds of the metric of "full" - that of the rival
+    paired     = median over images of their differences, per seed
 
-Paired medians and not differences of means, because a few bright images lift a mean. Below 0.05 dB a gap is
-nothing; 0.10 dB with the same sign in two seeds is real.
+A few bright images lift a mean, so both are there. Below 0.05 dB a gap is nothing; 0.10 dB with the same
+sign in two seeds is real.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
 
+from fsid.dataset.inspect_plot import as_label
 from fsid.evaluate.compare import ImageRow, Row
-from fsid.evaluate.report import Section, Table, method_label, plot, write_report
+from fsid.evaluate.report import METRICS, Section, Table, level_label, method_label, plot, write_report
 from fsid.evaluate.testset import ALL_SETS
 
 if TYPE_CHECKING:
     from fsid.evaluate.experiments import ExperimentConfig
 
-FIGURES = (("psnr_raw", "PSNR in RAW"), ("psnr", "PSNR after develop"))
+DECIBELS = METRICS[:2]
+PAPER_GAP = {"0.5lux": -0.40, "1lux": -0.74, "2lux": 0.01, "5lux": -0.14}
+"""Synthetic minus real, PSNR in dB, the paper's Table 2."""
 
 
 def write_experiment_report(
@@ -32,18 +37,14 @@ def write_experiment_report(
     rows: Sequence[Row],
     images: Sequence[ImageRow],
 ) -> Path:
-    """Tables of means over seeds with their spread, gaps of "full" to its rivals, and plots; one file."""
-    sections = []
-    for levels, name in _groups(rows):
-        tables = [_mean_table(rows, config, sources, levels, name)]
-        gaps = [_gap_table(images, config, sources, levels, name, *figure) for figure in FIGURES]
-        text = (
-            "First PSNR in RAW / PSNR after develop in dB / SSIM, mean over images and seeds, ± half the "
-            "spread of RAW PSNR between seeds. Then the gap of full to each rival in dB: paired median over "
-            "images, one figure per seed, in RAW and after develop."
-        )
-        figure = _gap_plot(images, config, sources, levels, name)
-        sections.append(Section(name, text, (*tables, *gaps), ((plot(figure, "gap over light level"),),)))
+    """Gaps of "full" to its rivals, the means over seeds with their spread, and plots; one file."""
+    results = _Results(config.seeds, tuple(sources), tuple(rows), tuple(images))
+    materials = results.levels[ALL_SETS]
+    common = [name for name in results.levels if name == ALL_SETS or results.levels[name] != materials]
+    single = [name for name in results.levels if name not in common]
+    sections = [_standing(results, common), *(_of_set(results, name, config.kind) for name in common)]
+    if single:
+        sections.append(_by_material(results, single))
     title = "FSID: ablation" if config.kind == "ablation" else "FSID: synthetic against real"
     seeds = ", ".join(map(str, config.seeds))
     lead = (
@@ -56,13 +57,13 @@ def write_experiment_report(
 
 
 def gaps(
-    images: Sequence[ImageRow], source: str, rival: str, level: str, name: str, figure: str
+    images: Sequence[ImageRow], source: str, rival: str, level: str, name: str, metric: str
 ) -> np.ndarray:
-    """Differences source - rival of one figure over the images of a set at a level; dB (0..1 for ssim)."""
+    """Differences source - rival of one metric over the images of a set at a level; dB (0..1 for ssim)."""
 
     def of(model: str) -> dict[tuple[str, str], float]:
         return {
-            (row.set, row.image): getattr(row, figure)
+            (row.set, row.image): getattr(row, metric)
             for row in images
             if (row.model, row.level) == (model, level) and name in (row.set, ALL_SETS)
         }
@@ -71,84 +72,141 @@ def gaps(
     return np.array([ours[key] - theirs[key] for key in ours if key in theirs])
 
 
-def _groups(rows: Sequence[Row]) -> list[tuple[tuple[str, ...], str]]:
-    """(levels, set) of every table: photographs per set, the materials together and one by one."""
-    found: dict[str, dict[str, None]] = {}
-    for row in rows:
-        found.setdefault(row.set, {})[row.level] = None
-    order = sorted(found, key=lambda name: name != ALL_SETS)
-    return [(tuple(found[name]), name) for name in order]
+@dataclass(frozen=True)
+class _Results:
+    """What was measured; models are called SOURCE-seedN, the baselines by their names."""
+
+    seeds: tuple[int, ...]
+    sources: tuple[str, ...]
+    rows: tuple[Row, ...]
+    images: tuple[ImageRow, ...]
+
+    @property
+    def rivals(self) -> list[str]:
+        return [source for source in self.sources if source != "full"]
+
+    @property
+    def levels(self) -> dict[str, tuple[str, ...]]:
+        """The levels of every set, all materials together first."""
+        found: dict[str, dict[str, None]] = {}
+        for row in self.rows:
+            found.setdefault(row.set, {})[row.level] = None
+        return {name: tuple(found[name]) for name in sorted(found, key=lambda name: name != ALL_SETS)}
+
+    def by_seed(self, source: str, name: str, metric: str) -> np.ndarray:
+        """(levels, seeds) means over the images of a set; of a baseline (levels, 1)."""
+        by = {(r.model, r.level): getattr(r, metric) for r in self.rows if r.set == name}
+        levels = self.levels[name]
+        is_baseline = (source, levels[0]) in by
+        models = [source] if is_baseline else [f"{source}-seed{seed}" for seed in self.seeds]
+        return np.array([[by[model, level] for model in models] for level in levels])
+
+    def gap(self, rival: str, name: str, metric: str) -> np.ndarray:
+        """(levels,) means over images and seeds, "full" minus the rival."""
+        ours, theirs = (self.by_seed(source, name, metric).mean(1) for source in ("full", rival))
+        return np.asarray(ours - theirs)
+
+    def medians(self, rival: str, name: str, metric: str) -> np.ndarray:
+        """(levels, seeds) paired medians, "full" minus the rival."""
+        return np.array(
+            [
+                [
+                    np.median(gaps(self.images, f"full-seed{s}", f"{rival}-seed{s}", level, name, metric))
+                    for s in self.seeds
+                ]
+                for level in self.levels[name]
+            ]
+        )
 
 
-def _models(source: str, config: ExperimentConfig) -> list[str]:
-    return [f"{source}-seed{seed}" for seed in config.seeds]
+def _set_label(name: str) -> str:
+    return "all materials" if name == ALL_SETS else name
 
 
-def _mean_table(
-    rows: Sequence[Row], config: ExperimentConfig, sources: Sequence[str], levels: Sequence[str], name: str
-) -> Table:
-    by = {(row.model, row.level): row for row in rows if row.set == name}
-    body = []
-    for source in ("noisy", "classical", *sources):
-        models = [source] if (source, levels[0]) in by else _models(source, config)
-        cells = []
-        for level in levels:
-            found = [by[model, level] for model in models]
-            raw, developed, ssim = (
-                [getattr(row, key) for row in found] for key in ("psnr_raw", "psnr", "ssim")
-            )
-            spread = f" ± {np.ptp(raw) / 2:.2f}" if len(found) > 1 else ""
-            cells.append(f"{np.mean(raw):.2f}{spread} / {np.mean(developed):.2f} / {np.mean(ssim):.3f}")
-        body.append((method_label(source), *cells))
-    return Table(("", *levels), tuple(body))
+def _standing(results: _Results, names: Sequence[str]) -> Section:
+    """The gaps of all sets, a table per rival and metric."""
+    tables = []
+    for rival in results.rivals:
+        for metric, title, _ in DECIBELS:
+            body = []
+            for name in names:
+                gap = results.gap(rival, name, metric)
+                lowest = int(gap.argmin())
+                body.append(
+                    (
+                        _set_label(name),
+                        f"{gap.mean():+.2f}",
+                        f"{gap[lowest]:+.2f} ({level_label(results.levels[name][lowest])})",
+                        " ".join(f"{m:+.2f}" for m in results.medians(rival, name, metric).mean(0)),
+                    )
+                )
+            head = ("", "mean", "lowest level", "paired medians")
+            tables.append(Table(f"full - {rival}, {title}", head, tuple(body)))
+    text = (
+        "What the network gains that was trained on the full variant of the scenes. Mean: over images, seeds "
+        "and levels. Paired medians: of the differences image by image, mean of levels, one figure per seed. "
+        "Below 0.05 dB a gap is nothing; 0.10 dB with the same sign in two seeds is real."
+    )
+    return Section("Where the full variant stands", text, tuple(tables))
 
 
-def _gap_table(
-    images: Sequence[ImageRow],
-    config: ExperimentConfig,
-    sources: Sequence[str],
-    levels: Sequence[str],
-    name: str,
-    figure: str,
-    title: str,
-) -> Table:
-    body = []
-    for rival in sources:
-        if rival == "full":
-            continue
-        cells = [
-            " ".join(f"{m:+.2f}" for m in _medians(images, config, rival, level, name, figure))
-            for level in levels
-        ]
-        body.append((f"full - {rival}", *cells))
-    return Table((title, *levels), tuple(body))
+def _of_set(results: _Results, name: str, kind: str) -> Section:
+    """Means of every source, then gaps level by level, in figures and as a plot."""
+    levels = results.levels[name]
+    head = ("", *map(level_label, levels), "mean")
+    tables = []
+    for metric, title, form in METRICS:
+        body = []
+        for source in ("noisy", "classical", *results.sources):
+            values = results.by_seed(source, name, metric)
+            half = np.ptp(values, axis=1) / 2
+            spread = [f" ± {h:{form}}" if values.shape[1] > 1 else "" for h in half]
+            cells = [f"{v:{form}}{s}" for v, s in zip(values.mean(1), spread, strict=True)]
+            body.append((method_label(source), *cells, f"{values.mean():{form}}"))
+        tables.append(Table(title, head, tuple(body)))
+    for metric, title, _ in DECIBELS:
+        body = []
+        for rival in results.rivals:
+            gap = results.gap(rival, name, metric)
+            body.append((f"full - {rival}", *(f"{g:+.2f}" for g in gap), f"{gap.mean():+.2f}"))
+            cells = [" ".join(f"{m:+.2f}" for m in each) for each in results.medians(rival, name, metric)]
+            body.append(("   paired medians", *cells, ""))
+        if kind == "real-vs-synthetic" and metric == "psnr" and levels == tuple(PAPER_GAP):
+            paper = list(PAPER_GAP.values())
+            body.append(("the paper's gap", *(f"{g:+.2f}" for g in paper), f"{np.mean(paper):+.2f}"))
+        tables.append(Table(f"Gap of {title}", head, tuple(body)))
+    text = "Means over images and seeds, ± half the spread between seeds."
+    return Section(
+        _set_label(name), text, tuple(tables), ((plot(_gap_plot(results, name), "paired medians"),),)
+    )
 
 
-def _medians(
-    images: Sequence[ImageRow], config: ExperimentConfig, rival: str, level: str, name: str, figure: str
-) -> list[float]:
-    return [
-        float(np.median(gaps(images, f"full-seed{seed}", f"{rival}-seed{seed}", level, name, figure)))
-        for seed in config.seeds
-    ]
+def _by_material(results: _Results, names: Sequence[str]) -> Section:
+    """The gaps of single materials, a table per rival and metric."""
+    levels = results.levels[names[0]]
+    tables = []
+    for rival in results.rivals:
+        for metric, title, _ in DECIBELS:
+            body = []
+            for name in names:
+                gap = results.gap(rival, name, metric)
+                body.append((name, *(f"{g:+.2f}" for g in gap), f"{gap.mean():+.2f}"))
+            head = ("", *map(level_label, levels), "mean")
+            tables.append(Table(f"full - {rival}, {title}", head, tuple(body)))
+    text = "Gaps by material, means over images and seeds. What each source comes to is in results.json."
+    return Section("By material", text, tuple(tables))
 
 
-def _gap_plot(
-    images: Sequence[ImageRow],
-    config: ExperimentConfig,
-    sources: Sequence[str],
-    levels: Sequence[str],
-    name: str,
-) -> Figure:
+def _gap_plot(results: _Results, name: str) -> Figure:
     figure = Figure(figsize=(8, 3), layout="constrained")
-    for axes, (key, title) in zip(figure.subplots(1, 2), FIGURES, strict=True):
-        for rival in (source for source in sources if source != "full"):
-            medians = np.array([_medians(images, config, rival, level, name, key) for level in levels])
+    levels = [as_label(level_label(level)) for level in results.levels[name]]
+    for axes, (metric, title, _) in zip(figure.subplots(1, 2), DECIBELS, strict=True):
+        for rival in results.rivals:
+            medians = results.medians(rival, name, metric)
             axes.plot(levels, medians.mean(axis=1), "o-", label=f"full - {rival}")
             axes.fill_between(levels, medians.min(axis=1), medians.max(axis=1), alpha=0.2)
         axes.axhline(0, color="grey", linewidth=0.8)
-        axes.set_title(title, fontsize=9)
-        axes.set_ylabel("gap (dB)")
+        axes.set_title(f"gap of {title}", fontsize=9)
         axes.grid(alpha=0.3)
     axes.legend(fontsize=7)
     return figure

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from fsid.errors import FsidError
 from fsid.evaluate.compare import CLASSICAL, NOISY, Comparison, Method, compare, write_images, write_results
-from fsid.evaluate.report import comparison_sections, write_report
+from fsid.evaluate.comparison_report import comparison_sections
+from fsid.evaluate.report import write_report
 from fsid.evaluate.testset import read_testset
 
 
@@ -59,7 +60,7 @@ def evaluate_models(
     if out is not None:
         write_results(comparison.rows, out / "results.json")
         write_images(comparison.images, out / "images.csv")
-        lead = f"{len(comparison.testset.images)} images, {len(levels)} levels. {comparison.testset.notes}."
+        lead = f"{len(comparison.testset.images)} images, {len(levels)} levels: {comparison.testset.notes}."
         write_report(out / "report.html", f"FSID: {testset.name}", lead, comparison_sections(comparison))
     return comparison
 
