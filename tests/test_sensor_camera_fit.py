@@ -243,6 +243,25 @@ def test_raw_files_without_an_iso_are_noted_as_iso_100(tmp_path, rng):
     found = calibrate([tmp_path], name="mine")
     assert found.profile.iso == (100,)
     assert any("no ISO known" in note for note in found.notes)
+    save_profile(tmp_path / "mine.yaml", found.profile)
+    assert "noted as ISO 100" in load_profile(tmp_path / "mine.yaml").notes
+
+
+def test_an_iso_that_is_given_replaces_no_other_unsaid(dng_bursts, tmp_path, rng):
+    one = [dng_bursts / "light1600"]
+    for given, is_noted in ((1600, False), (800, True)):
+        found = calibrate(one, name="x", layout=Layout(iso=given))
+        assert found.profile.iso == (given,)
+        assert any(f"--iso {given}" in note for note in found.notes) == is_noted
+        assert ("in place of ISO 1600" in found.profile.notes) == is_noted
+    _fails("--iso 800: .*ISO 1600, .*ISO 400", [*one, dng_bursts / "light400"], layout=Layout(iso=800))
+    _fails("--iso 800: .*ISO 1600, .*ISO 400", one, dark=[dng_bursts / "dark400"], layout=Layout(iso=800))
+    images = [to_dn(raw) for raw in exposures(rng, scene(), 800, 6)]
+    paths = [*write_arrays(tmp_path / "iso100", images[:3]), *write_arrays(tmp_path / "iso800", images[3:])]
+    _fails("--iso 800: .*iso100.*ISO 100, .*iso800.*ISO 800", paths, layout=LAYOUT)
+    assert calibrate(paths[3:], name="x", layout=LAYOUT).notes == ()
+    _fails("--iso nan", paths, layout=replace(LAYOUT, iso=float("nan")))
+    _fails("--iso inf", paths, layout=replace(LAYOUT, iso=float("inf")))
 
 
 def test_bad_bursts_are_named(tmp_path, dng_bursts, rng):

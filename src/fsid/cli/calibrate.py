@@ -41,11 +41,12 @@ def calibrate(
 
     Args:
         frames: RAW files that LibRaw opens, or bare mosaics (.npy, 16-bit .png or .tif, .raw); folders
-            stand for the files in them, at any depth. The ISO of bare mosaics is --iso, or in their path:
-            iso3200/a.png.
+            stand for the files in them, at any depth. The ISO of bare mosaics is in their path
+            (iso3200/a.png), or --iso.
         output: Profile to write, .yaml.
         dark: Frames with the lens covered, of the same ISOs: they give black level and sigma2.
-        iso: ISO of all bare mosaics.
+        iso: ISO of all frames that state none. One that they do state is replaced, and a note says so; frames
+            of several ISOs are refused.
         plot: Picture of samples, lines and residuals to write (.png, .pdf or .svg).
         cfa: Colours of a bare mosaic's first 2x2 pixels, read row by row; MONO for no colour filters.
         black_level: Black level of bare mosaics in DN; needed where there are no dark frames.

@@ -281,6 +281,7 @@ def _profile(
         sigma2=table([fit.sigma2_dn for fit in fits]) / span**2,
         xyz_to_camera=published_matrices(),
         source=_METHOD,
+        notes=". ".join(found.notes),
         date=found.date,
         measured=Measurement(
             k_error=table([fit.k_dn_error for fit in fits]) / span,

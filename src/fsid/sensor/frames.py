@@ -1,12 +1,13 @@
 """Frames on disk, sorted into bursts: same ISO, same exposure, same light.
 
 RAW files say their ISO and exposure time. Bare mosaics (.npy, .png, .tif, .raw) say nothing: their ISO is
-what the caller gives, or what their path says ("iso3200/a.png", "dark_ISO800_3.npy"), and consecutive files
-whose mean level agrees within 3 % or half a DN are one burst. Frames are opened one by one and never kept.
+what their path says ("iso3200/a.png", "dark_ISO800_3.npy") or the caller gives, and consecutive files whose
+mean level agrees within 3 % or half a DN are one burst. Frames are opened one by one and never kept.
 """
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -84,8 +85,8 @@ def find_frames(
         raise FsidError("calibration needs the frames of at least one burst")
     if both := {path.resolve() for path in paths} & {path.resolve() for path in dark}:
         raise FsidError(f"{min(both)}: is given as a frame and as a dark frame; leave one out")
-    if layout.iso is not None and not layout.iso > 0:
-        raise FsidError(f"--iso {layout.iso:g}: must be above 0")
+    if layout.iso is not None and not 0 < layout.iso < math.inf:
+        raise FsidError(f"--iso {layout.iso:g}: must be a number above 0")
     bare = paths[0].suffix.lower() in BARE_SUFFIXES
     for path in (*paths, *dark):
         if (path.suffix.lower() in BARE_SUFFIXES) != bare:
@@ -149,9 +150,9 @@ def _raw_frames(paths: Sequence[Path], dark: Sequence[Path], layout: Layout) -> 
 
     def frame(path: Path) -> Frame:
         header: RawHeader = headers[path]
-        return Frame(path, header.iso or _iso(path, layout), header.exposure_s, 0.0)
+        return Frame(path, header.iso or _iso_in(path), header.exposure_s, 0.0)
 
-    frames, notes = _iso_or_100([frame(path) for path in (*paths, *dark)])
+    frames, notes = _with_iso([frame(path) for path in (*paths, *dark)], layout.iso)
     return FrameSet(
         camera, tuple(frames[: len(paths)]), tuple(frames[len(paths) :]), headers[paths[0]].date, notes
     )
@@ -175,7 +176,7 @@ def _bare_frames(
         if layout.white_level is not None:
             check_white(dn, layout.black_level or 0, layout.white_level, path)
         shape, highest = dn.shape, max(highest, int(dn.max()))
-        frames.append(Frame(path, _iso(path, layout), 0.0, float(dn.mean())))
+        frames.append(Frame(path, _iso_in(path), 0.0, float(dn.mean())))
         if progress is not None:
             progress(number + 1, len(paths) + len(dark))
     notes = []
@@ -185,24 +186,38 @@ def _bare_frames(
         notes.append(
             f"white level {white} DN taken from the largest value, {highest}; --white-level states it"
         )
-    frames, unknown = _iso_or_100(frames)
+    frames, assumed = _with_iso(frames, layout.iso)
     check_levels(layout.black_level or 0, white, str(paths[0]))
     camera = Camera("", cfa, layout.black_level, white, bare=True)
-    return FrameSet(camera, tuple(frames[: len(paths)]), tuple(frames[len(paths) :]), "", (*notes, *unknown))
+    return FrameSet(camera, tuple(frames[: len(paths)]), tuple(frames[len(paths) :]), "", (*notes, *assumed))
 
 
-def _iso_or_100(frames: list[Frame]) -> tuple[list[Frame], tuple[str, ...]]:
-    """The frames, those of unknown ISO as of ISO 100, and a note where there were any."""
-    if all(frame.iso > 0 for frame in frames):
-        return frames, ()
-    known = [frame if frame.iso > 0 else replace(frame, iso=100.0) for frame in frames]
-    return known, ("no ISO known, noted as ISO 100; --iso states it",)
+def _with_iso(frames: list[Frame], given: float | None) -> tuple[list[Frame], tuple[str, ...]]:
+    """The frames with the ISO that is `given`, else 100 where they state none; a note where it is not theirs.
+
+    FsidError where one ISO is given for frames that state several.
+    """
+    if given is None:
+        if all(frame.iso > 0 for frame in frames):
+            return frames, ()
+        known = [frame if frame.iso > 0 else replace(frame, iso=100.0) for frame in frames]
+        return known, ("no ISO known, noted as ISO 100; --iso states it",)
+    stated: dict[float, Path] = {}
+    for frame in frames:
+        if frame.iso > 0:
+            stated.setdefault(frame.iso, frame.path)
+    if len(stated) > 1:
+        (one, path), (two, other), *_ = stated.items()
+        raise FsidError(
+            f"--iso {given:g}: {path} states ISO {one:g}, {other} ISO {two:g}; leave the option out, or give "
+            f"the frames of one ISO"
+        )
+    notes = [f"--iso {given:g} is taken in place of ISO {iso:g}, which the frames state" for iso in stated]
+    return [replace(frame, iso=given) for frame in frames], tuple(notes if given not in stated else ())
 
 
-def _iso(path: Path, layout: Layout) -> float:
-    """The ISO that the caller gives, else the last one in the path, else 0."""
-    if layout.iso is not None:
-        return layout.iso
+def _iso_in(path: Path) -> float:
+    """The last ISO in a path, 0 where there is none."""
     named = _ISO_IN_PATH.findall(path.as_posix())
     return float(named[-1]) if named else 0.0
 
