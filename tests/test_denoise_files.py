@@ -282,6 +282,27 @@ def test_importing_the_package_imports_no_pytorch() -> None:
     subprocess.run([sys.executable, "-c", script], check=True)
 
 
+def test_noise_far_beyond_the_profile_is_said_once_per_run(
+    tmp_path: Path, network: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "in"
+    folder.mkdir()
+    for name, iso in (("a", 3200), ("b", 51200), ("c", 25600)):
+        write_dng(folder / f"{name}.dng", replace(noisy_raw(), iso=float(iso)))
+    command = ["denoise", "--model", str(network), "--profile", "pixel6"]
+
+    def said(*more: str) -> list[str]:
+        main([*command, *more])
+        return [line for line in capsys.readouterr().err.splitlines() if "extrapolated" in line]
+
+    (line,) = said(str(folder), str(tmp_path / "out"))
+    assert line.endswith("its noise at ISO 3200 to 51200 is extrapolated far")
+    assert said(str(folder / "a.dng"), str(tmp_path / "a.dng")) == []
+    (line,) = said(str(folder / "a.dng"), str(tmp_path / "a.dng"), "--iso", "20000")
+    assert line.endswith("its noise at ISO 20000 is extrapolated far")
+    assert said(str(folder / "b.dng"), str(tmp_path / "b.dng"), "--quiet") == []
+
+
 def test_a_profile_without_colour_filters_is_refused(tmp_path: Path) -> None:
     save_profile(tmp_path / "mono.yaml", replace(load_profile("pixel6"), cfa="MONO"))
     with pytest.raises(FsidError, match=r"mono\.yaml: is of a sensor without colour filters"):

@@ -191,6 +191,17 @@ def test_options_without_effect_are_refused(photos: Path, tmp_path: Path, option
     assert f"{name}: fsid testset {source} has no use" in " ".join(capsys.readouterr().err.split())
 
 
+def test_noise_far_beyond_the_profile_is_said_once(photos: Path, tmp_path: Path, capsys):
+    for isos, count in ((("800", "3200"), 0), (("800", "51200"), 1)):
+        out = str(tmp_path / f"set{count}")
+        main(["testset", "photos", str(photos), "-o", out, "--iso", *isos])
+        assert capsys.readouterr().err.count("at ISO 800 to 51200 is extrapolated far") == count
+        main(["evaluate", out])
+        assert capsys.readouterr().err.count("at ISO 800 to 51200 is extrapolated far") == count
+    main(["evaluate", out, "--quiet"])
+    assert capsys.readouterr().err == ""
+
+
 def test_models_are_told_apart_by_name(tmp_path: Path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for run in ("lr-0.1", "lr-0.2", "b/lr-0.2"):

@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.text import Text
 from tyro.conf import Positional
 
+from fsid.cli.iso_notes import note_extrapolation, note_files
 from fsid.cli.progress import progress_bar
 from fsid.errors import FsidError
 
@@ -62,6 +63,10 @@ def denoise(
     sources = find_raws(input, bare=layout is not None) if input.is_dir() else None
     network = load_model(model, backend)
     console = Console(stderr=True)
+    if profile is not None and iso is not None:
+        note_extrapolation([profile], iso, iso, quiet=quiet)
+    elif profile is not None:
+        note_files(profile, sources or [input], quiet=quiet)
     if sources is not None:
         with progress_bar("denoising", "files", quiet=quiet) as progress:
             denoise_folder(

@@ -9,6 +9,7 @@ from rich.table import Column, Table
 from tyro.conf import Positional, UseAppendAction
 
 from fsid.cli.arguments import OptionalOutput
+from fsid.cli.iso_notes import note_files
 from fsid.cli.progress import progress_bar
 
 
@@ -31,9 +32,13 @@ def evaluate(
         quiet: No progress bar.
     """
     from fsid.evaluate.models import evaluate_models
+    from fsid.sensor import profile_names
 
     with progress_bar("measuring", "captures", quiet=quiet) as progress:
         comparison = evaluate_models(testset, model, output, progress=progress)
+    made = comparison.testset
+    if made.camera in profile_names():  # that of a file is not there to be asked
+        note_files(made.camera, made.captures(testset), quiet=quiet)
     for name in dict.fromkeys(row.set for row in comparison.rows):
         heads = (Column(head, overflow="fold") for head in ("model", *comparison.testset.levels))
         table = Table(*heads, title=f"{name}: PSNR raw / PSNR / SSIM")

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
+from pathlib import Path
 
 from rich.console import Console
+
+from fsid.errors import FsidError
 
 
 def note_extrapolation(names: Iterable[str], iso_min: float, iso_max: float, *, quiet: bool) -> None:
@@ -13,11 +17,25 @@ def note_extrapolation(names: Iterable[str], iso_min: float, iso_max: float, *, 
 
     console = Console(stderr=True, quiet=quiet)
     for profile in far_extrapolated(names, iso_min, iso_max):
-        first, last = profile.iso[0], profile.iso[-1]
-        measured = f"ISO {first:g}" if first == last else f"ISO {first:g} to {last:g}"
         console.print(
-            f"note: profile {profile.name} was measured at {measured}; "
-            f"its noise at ISO {iso_min:g} to {iso_max:g} is extrapolated far",
+            f"note: profile {profile.name} was measured at {_range(profile.iso[0], profile.iso[-1])}; "
+            f"its noise at {_range(iso_min, iso_max)} is extrapolated far",
             soft_wrap=True,
             markup=False,
         )
+
+
+def note_files(profile: str, paths: Iterable[Path], *, quiet: bool) -> None:
+    """The same for one profile and the ISOs that RAW files state; one that cannot be read states none."""
+    from fsid.sensor.dng import read_header
+
+    isos = []
+    for path in () if quiet else paths:
+        with suppress(FsidError):
+            isos.append(read_header(path).iso)
+    if known := [iso for iso in isos if iso > 0]:
+        note_extrapolation([profile], min(known), max(known), quiet=quiet)
+
+
+def _range(first: float, last: float) -> str:
+    return f"ISO {first:g}" if first == last else f"ISO {first:g} to {last:g}"

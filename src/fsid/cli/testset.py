@@ -11,6 +11,7 @@ from rich.table import Column, Table
 from tyro.conf import Positional
 
 from fsid.cli.arguments import Output
+from fsid.cli.iso_notes import note_files
 from fsid.cli.progress import progress_bar
 from fsid.errors import FsidError
 
@@ -62,11 +63,13 @@ def testset(
 
     _check_folders(source, folders)
     _check_options(source, {"--iso": iso, "--lux": lux, "--material": material, "--frames": frames != 1})
+    if source != "from-bursts":
+        camera = camera or "pixel6"
     if source == "simulate":
         with progress_bar("materials", "pictures", quiet=quiet) as progress:
-            simulated_testset(
+            made = simulated_testset(
                 output,
-                camera=camera or "pixel6",
+                camera=camera,
                 luxes=lux,
                 isos=iso,
                 materials=material,
@@ -77,17 +80,18 @@ def testset(
                 seed=seed,
                 progress=progress,
             )
-        return
-    if source == "from-bursts":
+    elif source == "from-bursts":
         with progress_bar("bursts", "bursts", quiet=quiet) as progress:
-            _, found = burst_testset(folders[0], output, camera=camera, frames=frames, progress=progress)
+            made, found = burst_testset(folders[0], output, camera=camera, frames=frames, progress=progress)
         Console(markup=False).print(_table(found))
-        return
-    isos = iso if iso or lux else DEFAULT_ISOS
-    with progress_bar("photographs", "photographs", quiet=quiet) as progress:
-        photo_testset(
-            folders, output, camera=camera or "pixel6", isos=isos, luxes=lux, seed=seed, progress=progress
-        )
+    else:
+        isos = iso if iso or lux else DEFAULT_ISOS
+        with progress_bar("photographs", "photographs", quiet=quiet) as progress:
+            made = photo_testset(
+                folders, output, camera=camera, isos=isos, luxes=lux, seed=seed, progress=progress
+            )
+    if camera:
+        note_files(camera, made.captures(output), quiet=quiet)
 
 
 def _check_folders(source: str, folders: tuple[Path, ...]) -> None:

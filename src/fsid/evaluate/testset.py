@@ -91,6 +91,11 @@ class TestSet:
         suffix = f".{frame:02d}" if frame else ""
         return root / image.name / f"{level}.noisy{suffix}.dng"
 
+    def captures(self, root: Path) -> Iterator[Path]:
+        """Paths of all captures."""
+        for image, level, frame in product(self.images, self.levels, range(self.frames)):
+            yield self.noisy(root, image, level, frame)
+
 
 def read_testset(root: Path) -> TestSet:
     """The description of the test set in `root`; FsidError where it is missing or broken."""
