@@ -150,6 +150,30 @@ def test_photographs_and_the_dataset_made_from_them_are_seen_alike(photos, tmp_p
     assert (tmp_path / "out" / "statistics.png").stat().st_size > 10_000
 
 
+def test_a_folder_that_refuses_files_is_said_before_the_work(photos, tmp_path, capsys, monkeypatch):
+    """Else minutes of measuring would be lost; and neither file is written without the other."""
+
+    def never(*_, **__):
+        raise AssertionError("measured what cannot be written")
+
+    command = ["inspect", str(photos), "--quiet", "--out"]
+    (tmp_path / "file").write_text("")
+    (tmp_path / "out" / "statistics.png").mkdir(parents=True)
+    with pytest.raises(SystemExit):
+        main([*command, str(tmp_path / "out")])
+    assert "statistics.png: cannot be written" in capsys.readouterr().err
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["statistics.png"]
+    monkeypatch.setattr("fsid.dataset.inspect.inspect", never)
+    with pytest.raises(SystemExit):
+        main([*command, str(tmp_path / "file" / "out")])
+    assert "file is no folder that you may write to" in " ".join(capsys.readouterr().err.split())
+    monkeypatch.setattr("fsid.files.os.access", lambda *_: False)
+    with pytest.raises(SystemExit):
+        main([*command, str(tmp_path / "new")])
+    assert "that you may write to" in " ".join(capsys.readouterr().err.split())
+    assert not (tmp_path / "new").exists()
+
+
 def test_a_photograph_may_have_a_name_that_is_no_text(photos, tmp_path):
     name = os.fsdecode(b"\xff.png")
     try:

@@ -8,7 +8,7 @@ import pytest
 
 from fsid.dataset import save_png
 from fsid.errors import FsidError
-from fsid.files import write_atomically
+from fsid.files import write_atomically, write_together
 
 
 def test_a_file_is_replaced_whole(tmp_path: Path) -> None:
@@ -43,6 +43,19 @@ def test_a_picture_that_cannot_be_written_leaves_the_old_one(
     with pytest.raises(FsidError, match=r"a\.png: cannot be written \(No space"):
         save_png(tmp_path / "a.png", picture + 255)
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {"a.png": before}
+
+
+@pytest.mark.parametrize("refused", ["folder", "missing/b", "x" * 254])
+def test_of_files_that_belong_together_none_is_written_without_the_others(
+    tmp_path: Path, refused: str
+) -> None:
+    (tmp_path / "folder").mkdir()
+    write_together({tmp_path / "a": b"old", tmp_path / "b": b"old"})
+    for order in (("a", refused), (refused, "a")):
+        with pytest.raises(FsidError, match=f"{refused}: cannot be written"):
+            write_together({tmp_path / name: b"new" for name in order})
+        assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "b", "folder"]
+        assert (tmp_path / "a").read_bytes() == b"old"
 
 
 def test_a_place_that_is_no_folder_is_one_line(tmp_path: Path) -> None:

@@ -160,6 +160,7 @@ def test_a_refused_output_leaves_nothing(dng_bursts, tmp_path, capsys):
     for profile, plot, named in (
         ("missing/p.yaml", "fit.png", "p.yaml"),
         ("p.yaml", "missing/fit.png", "fit.png"),
+        ("p.yaml", f"{'x' * 250}.png", "File name too long"),
         ("p.yaml", "fit.exe", "fit.exe"),
         (".", "fit.png", "out"),
     ):

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import fcntl
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from fsid.errors import FsidError
@@ -13,15 +14,35 @@ from fsid.errors import FsidError
 
 def write_atomically(path: Path, data: bytes) -> None:
     """Replace `path` by `data`, or leave it as it was. FsidError where the disk refuses."""
-    part = path.with_name(f"{path.name}.{os.getpid()}.part")
+    write_together({path: data})
+
+
+def write_together(files: Mapping[Path, bytes]) -> None:
+    """Write files that belong together: all lie on the disk before the first takes its place, in their order.
+
+    FsidError names the one that the disk refuses; then all are as they were.
+    """
+    parts = {path: path.with_name(f"{path.name}.{os.getpid()}.part") for path in files}
     try:
-        part.write_bytes(data)
-        os.replace(part, path)
+        for path, data in files.items():
+            parts[path].write_bytes(data)
+            if path.is_dir():
+                raise OSError(errno.EISDIR, os.strerror(errno.EISDIR))
+        for path, part in parts.items():
+            os.replace(part, path)
     except OSError as error:
         raise FsidError(f"{path}: cannot be written ({error.strerror})") from None
     finally:
-        with contextlib.suppress(OSError):  # gone already, or never there
-            part.unlink()
+        for part in parts.values():
+            with contextlib.suppress(OSError):  # gone already, or never there
+                part.unlink()
+
+
+def check_folder(folder: Path) -> None:
+    """FsidError unless `folder` is there or can be made, and be written to: before the work that fills it."""
+    there = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+    if not (there.is_dir() and os.access(there, os.W_OK | os.X_OK)):
+        raise FsidError(f"{folder}: cannot be written; {there} is no folder that you may write to")
 
 
 @contextlib.contextmanager

@@ -59,12 +59,13 @@ def calibrate(
             as the frames show them, and switch them on in the profile.
         quiet: No progress bar, no table.
     """
-    from fsid.files import write_atomically
-    from fsid.sensor import Layout, save_profile
+    from fsid.files import write_together
+    from fsid.sensor import Layout
     from fsid.sensor import calibrate as calibrate_frames
-    from fsid.sensor.fit_plot import calibration_picture, check_folder, check_picture
+    from fsid.sensor.fit_plot import calibration_picture, check_output, check_picture
+    from fsid.sensor.profiles import profile_file
 
-    check_folder(output)
+    check_output(output)
     if plot is not None:
         check_picture(plot, output)
     layout = Layout(iso, cfa, black_level, white_level, width, height)
@@ -79,10 +80,8 @@ def calibrate(
             terms=terms,
             progress=progress,
         )
-    picture = calibration_picture(found, plot.suffix) if plot is not None else b""
-    save_profile(output, found.profile)
-    if plot is not None:
-        write_atomically(plot, picture)
+    pictures = {} if plot is None else {plot: calibration_picture(found, plot.suffix)}
+    write_together({**pictures, output: profile_file(found.profile)})
     for note in found.notes:
         Console(stderr=True, quiet=quiet).print(Text(f"note: {note}"), soft_wrap=True)
     Console(quiet=quiet).print(_table(found))

@@ -37,11 +37,14 @@ def inspect(
         quiet: No progress bar.
     """
     from fsid.dataset.inspect import inspect as inspect_sets
-    from fsid.dataset.inspect import save_inspection
-    from fsid.dataset.inspect_plot import plot_inspection
+    from fsid.dataset.inspect import inspection_json
+    from fsid.dataset.inspect_plot import inspection_picture
     from fsid.dataset.statistics import TITLES
     from fsid.errors import FsidError
+    from fsid.files import check_folder, write_together
 
+    if out is not None:
+        check_folder(out)
     if other is not None and reference is None:
         raise FsidError("--other needs --reference: it says how far two real sets lie apart")
     with progress_bar("pictures", "pictures", quiet=quiet) as progress:
@@ -61,9 +64,12 @@ def inspect(
         table.add_row(*row)
     Console(markup=False).print(table)
     if out is not None:
+        results = {
+            out / "statistics.png": inspection_picture(found),
+            out / "statistics.json": inspection_json(found),
+        }
         try:
             out.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise FsidError(f"{out}: cannot be made ({error.strerror})") from None
-        save_inspection(found, out / "statistics.json")
-        plot_inspection(out / "statistics.png", found)
+        write_together(results)

@@ -24,7 +24,6 @@ from fsid.dataset.photos import find_photos, read_photo
 from fsid.dataset.shards import read_member, read_record
 from fsid.dataset.statistics import Comparison, compare, measure, pool
 from fsid.errors import FsidError
-from fsid.files import write_atomically
 from fsid.sensor import camera_to_srgb_matrix, clean_from_photo, load_profile, pack, srgb_encode
 from fsid.sensor.colour import is_of_camera
 
@@ -93,8 +92,8 @@ def inspect(
     return Inspection(str(data), len(measured[0]), values, real, str(reference), tuple(comparisons))
 
 
-def save_inspection(inspection: Inspection, path: Path) -> None:
-    """Write means, distances and yardsticks as JSON."""
+def inspection_json(inspection: Inspection) -> bytes:
+    """Means, distances and yardsticks as a JSON file."""
     content = {
         "data": inspection.data,
         "pictures": inspection.pictures,
@@ -102,7 +101,7 @@ def save_inspection(inspection: Inspection, path: Path) -> None:
         "reference": inspection.reference_name,
         "statistics": [_finite(asdict(c)) for c in inspection.comparisons],
     }
-    write_atomically(path, (json.dumps(content, indent=1) + "\n").encode())
+    return (json.dumps(content, indent=1) + "\n").encode()
 
 
 def _finite(record: dict) -> dict:

@@ -10,14 +10,13 @@ from matplotlib.figure import Figure
 
 from fsid.dataset.inspect import Inspection
 from fsid.dataset.statistics import TITLES
-from fsid.files import write_atomically
 
 _COLUMNS = 4
 _BINS = 40
 
 
-def plot_inspection(path: Path, inspection: Inspection) -> None:
-    """Write the histograms as PNG."""
+def inspection_picture(inspection: Inspection) -> bytes:
+    """The histograms as a PNG file."""
     distances = {c.name: c for c in inspection.comparisons}
     rows = -(-len(TITLES) // _COLUMNS)
     figure = Figure(figsize=(4.2 * _COLUMNS, 2.8 * rows), layout="constrained")
@@ -38,7 +37,7 @@ def plot_inspection(path: Path, inspection: Inspection) -> None:
     figure.axes[0].legend(fontsize=7)
     data = io.BytesIO()
     figure.savefig(data, format="png", dpi=90)
-    write_atomically(path, data.getvalue())
+    return data.getvalue()
 
 
 def as_label(name: str) -> str:

@@ -15,6 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fsid.errors import FsidError
+from fsid.files import check_folder
 from fsid.sensor.calibrate import LINEAR_SHARE, NoiseFit
 from fsid.sensor.camera_fit import Calibration
 from fsid.sensor.camera_profile import MONO, CameraProfile
@@ -34,13 +35,14 @@ def check_picture(path: Path, beside: Path | None = None) -> None:
         raise FsidError(f"{path}: would be both profile and plot; give two names")
     if path.suffix.lower() not in PICTURES:
         raise FsidError(f"{path}: a plot is written as {', '.join(PICTURES)}")
-    check_folder(path)
+    check_output(path)
 
 
-def check_folder(path: Path) -> None:
-    """FsidError unless the folder of `path` is there and `path` is no folder."""
+def check_output(path: Path) -> None:
+    """FsidError unless the folder of `path` is there and takes files, and `path` is no folder."""
     if not path.parent.is_dir() or path.is_dir():
         raise FsidError(f"{path}: cannot be written; its folder must be there, and it must be no folder")
+    check_folder(path.parent)
 
 
 def calibration_picture(calibration: Calibration, suffix: str) -> bytes:

@@ -77,7 +77,12 @@ def far_extrapolated(names: Iterable[str | Path], iso_min: float, iso_max: float
 
 
 def save_profile(path: str | Path, profile: CameraProfile) -> None:
-    """Write `profile` as the YAML that `load_profile` reads (whole or not at all), numbers to 6 digits."""
+    """Write `profile` as the YAML that `load_profile` reads, whole or not at all."""
+    write_atomically(Path(path), profile_file(profile))
+
+
+def profile_file(profile: CameraProfile) -> bytes:
+    """The content of the file that `save_profile` writes, numbers to 6 digits."""
     keys = ("name", "camera", "cfa", "bits", "black_level", "white_level", "date", "source", "notes")
     data = {key: getattr(profile, key) for key in keys}
     data |= {"xyz_to_camera": profile.xyz_to_camera.tolist()}
@@ -88,8 +93,7 @@ def save_profile(path: str | Path, profile: CameraProfile) -> None:
     if profile.measured is not None and len(profile.iso) > 1:
         data["law"] = _law(profile)
     data["levels"] = [_level(profile, row) for row in range(len(profile.iso))]
-    text = yaml.safe_dump(data, sort_keys=False, default_flow_style=None, width=110)
-    write_atomically(Path(path), text.encode())
+    return yaml.safe_dump(data, sort_keys=False, default_flow_style=None, width=110).encode()
 
 
 def _switched_on(terms: NoiseTerms) -> dict[str, Any]:
