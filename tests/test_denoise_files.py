@@ -282,6 +282,66 @@ def test_importing_the_package_imports_no_pytorch() -> None:
     subprocess.run([sys.executable, "-c", script], check=True)
 
 
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        ("--profile nokia", "nokia"),
+        ("--profile pixel6 --iso -1", "--iso -1: must be a number above 0"),
+        ("--profile pixel6 --iso 0", "--iso 0: must be a number above 0"),
+        ("--profile pixel6 --iso nan", "--iso nan: must be a number above 0"),
+        ("--profile pixel6 --iso inf", "--iso inf: must be a number above 0"),
+        ("--profile pixel6 --iso 1e9", "k and sigma2 are variances"),
+        ("--iso 800", "give --profile too"),
+        ("--strength -1", "strength -1"),
+        ("--cfa RGGG --black-level 64 --white-level 1023", "--cfa: 'RGGG'"),
+        ("--cfa RGGB --black-level 64 --white-level 60", "--black-level and --white-level"),
+        ("--profile pixel6 --cfa RGGB --black-level 64 --white-level 1023", "states no ISO, give --iso"),
+    ],
+)
+def test_a_wrong_option_is_said_once_and_leaves_no_folder(
+    tmp_path: Path, network: Path, options: str, named: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, out = tmp_path / "in", tmp_path / "out"
+    folder.mkdir()
+    for name in ("a", "b"):
+        write_dng(folder / f"{name}.dng", noisy_raw())
+        np.save(folder / f"{name}.npy", np.full((48, 64), 500, np.uint16))
+    with pytest.raises(SystemExit) as stop:
+        main(["denoise", str(folder), str(out), "--model", str(network), *options.split()])
+    assert stop.value.code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert named in line
+    assert not out.exists()
+
+
+def test_a_folder_of_which_nothing_can_be_denoised_leaves_none(tmp_path: Path, network: Path) -> None:
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / "a.dng").write_text("broken")
+    with pytest.raises(SystemExit):
+        main(["denoise", str(tmp_path / "in"), str(tmp_path / "out"), "--model", str(network), "--quiet"])
+    assert not (tmp_path / "out").exists()
+
+
+def test_files_in_subfolders_are_left_out_and_counted(
+    tmp_path: Path, network: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "in"
+    for place in ("day1", "day2/raw", ".trash"):
+        (folder / place).mkdir(parents=True)
+        write_dng(folder / place / "a.dng", noisy_raw())
+    command = ["denoise", str(folder), str(folder / "out"), "--model", str(network)]
+    with pytest.raises(SystemExit):
+        main(command)
+    assert f"{folder / 'day1' / 'a.dng'} lies deeper" in capsys.readouterr().err
+    write_dng(folder / "a.dng", noisy_raw())
+    for _ in range(2):  # the second time results lie inside, too
+        main(command)
+        (line,) = (line for line in capsys.readouterr().err.splitlines() if "note:" in line)
+        assert line.startswith(f"note: files in folders inside {folder} are left out (2, the first one")
+    main([*command, "--quiet"])
+    assert capsys.readouterr().err == ""
+
+
 def test_noise_far_beyond_the_profile_is_said_once_per_run(
     tmp_path: Path, network: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

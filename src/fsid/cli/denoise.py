@@ -39,7 +39,7 @@ def denoise(
     Args:
         input: DNG or any other Bayer RAW that LibRaw opens; or a bare mosaic (.npy, 16-bit .png or .tif, .raw
             or .bin of 16-bit little-endian values), given --cfa, --black-level and --white-level; or a folder
-            of either.
+            of either (folders inside it are left out).
         output: DNG file to write (replaced if it is there), another than the input; a folder where the input
             is one.
         model: Folder of a training (fsid train), its model.safetensors, a file of fsid export (.onnx or
@@ -57,17 +57,20 @@ def denoise(
         height: Height of a .raw or .bin mosaic in pixels.
         quiet: No progress bar, no line on the noise level.
     """
-    from fsid.denoise import denoise_file, denoise_folder, find_raws, load_model
+    from fsid.denoise import check_options, denoise_file, denoise_folder, find_raws, load_model
 
     layout = _layout(cfa, black_level, white_level, width, height)
     sources = find_raws(input, bare=layout is not None) if input.is_dir() else None
     network = load_model(model, backend)
+    check_options(profile, iso, strength, layout)
     console = Console(stderr=True)
     if profile is not None and iso is not None:
         note_extrapolation([profile], iso, iso, quiet=quiet)
     elif profile is not None:
         note_files(profile, sources or [input], quiet=quiet)
     if sources is not None:
+        if not quiet:
+            _note_left_out(input, output, bare=layout is not None)
         with progress_bar("denoising", "files", quiet=quiet) as progress:
             denoise_folder(
                 sources,
@@ -97,13 +100,27 @@ def denoise(
         console.print(f"noise: {noise.source}, k = {k:.3g}, sigma2 = {sigma2:.3g}", soft_wrap=True)
 
 
+def _note_left_out(folder: Path, output: Path, *, bare: bool) -> None:
+    """A line on the files in subfolders; an output that is one of them holds results."""
+    from fsid.denoise.files import raws_below
+
+    below = [p for p in raws_below(folder, bare=bare) if output.resolve() not in p.resolve().parents]
+    if below:
+        line = f"note: files in folders inside {folder} are left out ({len(below)}, the first one {below[0]})"
+        Console(stderr=True).print(Text(f"{line}; give each folder by itself"), soft_wrap=True)
+
+
 def _layout(
     cfa: str | None, black_level: int | None, white_level: int | None, width: int | None, height: int | None
 ) -> Layout | None:
     from fsid.sensor import Layout
+    from fsid.sensor.mosaic import check_cfa
+    from fsid.sensor.quantise import check_levels
 
     if cfa is None and black_level is None and white_level is None:
         return None
     if cfa is None or black_level is None or white_level is None:
         raise FsidError("a bare mosaic needs all three: --cfa, --black-level and --white-level")
+    check_cfa(cfa, "--cfa")
+    check_levels(black_level, white_level, "--black-level and --white-level")
     return Layout(None, cfa, black_level, white_level, width, height)

@@ -14,7 +14,7 @@ from types import ModuleType
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 from fsid.denoise.denoise import Network, denoise_raw
-from fsid.denoise.files import Noise, denoise_file, denoise_folder, find_raws, noise_of
+from fsid.denoise.files import Noise, check_options, denoise_file, denoise_folder, find_raws, noise_of
 from fsid.denoise.interface import denoise as _denoise
 from fsid.denoise.interface import load_model
 from fsid.denoise.model import Denoiser, ModelCard, load_denoiser, save_model
@@ -30,6 +30,7 @@ __all__ = [
     "Noise",
     "RawDenoiser",
     "TrainConfig",
+    "check_options",
     "denoise_file",
     "denoise_folder",
     "denoise_raw",

@@ -5,11 +5,13 @@ noise of a file = profile at an ISO, if one is named | its own `NoiseProfile` | 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import contextlib
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from fsid.denoise.denoise import Network, denoise_raw
+from fsid.denoise.denoise import Network, check_strength, denoise_raw
 from fsid.denoise.preview import preview_of
 from fsid.errors import FsidError
 from fsid.sensor import (
@@ -47,16 +49,28 @@ def find_raws(folder: Path, *, bare: bool = False) -> list[Path]:
     """
     if not folder.is_dir():
         raise FsidError(f"{folder}: is not a folder of RAW files")
-    suffixes = BARE_SUFFIXES if bare else sorted(RAW_SUFFIXES)
     try:
         inside = sorted(path for path in folder.iterdir() if path.is_file())
     except OSError as error:
         raise FsidError(f"{folder}: cannot be read ({error.strerror})") from None
+    suffixes = _suffixes(bare)
     raws = [p for p in inside if p.suffix.lower() in suffixes and not p.name.startswith(".")]
     if not raws:
         what = "bare mosaic" if bare else "RAW file"
-        raise FsidError(f"{folder}: holds no {what} ({', '.join(suffixes)})")
+        below = raws_below(folder, bare=bare)
+        where = f"; {below[0]} lies deeper, give its folder" if below else ""
+        raise FsidError(f"{folder}: holds no {what} ({', '.join(suffixes)}){where}")
     return raws
+
+
+def raws_below(folder: Path, *, bare: bool = False) -> list[Path]:
+    """What `find_raws` leaves out: the RAW files in folders inside `folder`, hidden ones excepted."""
+    files = (p for p in folder.glob("*/**/*") if p.suffix.lower() in _suffixes(bare) and p.is_file())
+    return sorted(p for p in files if not any(n.startswith(".") for n in p.relative_to(folder).parts))
+
+
+def _suffixes(bare: bool) -> Sequence[str]:
+    return BARE_SUFFIXES if bare else sorted(RAW_SUFFIXES)
 
 
 def read_input(path: Path, layout: Layout | None) -> Raw:
@@ -71,15 +85,32 @@ def read_input(path: Path, layout: Layout | None) -> Raw:
     return read_raw(path)
 
 
+def check_options(
+    profile: str | None, iso: float | None, strength: float = 1.0, layout: Layout | None = None
+) -> None:
+    """FsidError for what no file can be denoised with, whatever it holds."""
+    _check_iso(profile, iso)
+    camera = None if profile is None else load_bayer_profile(profile)
+    if camera is not None and iso is None and layout is not None and layout.iso is None:
+        raise FsidError(f"--profile {profile}: a bare mosaic states no ISO, give --iso")
+    check_strength(None if camera is None or iso is None else camera.level(iso), strength)
+
+
+def _check_iso(profile: str | None, iso: float | None) -> None:
+    if iso is not None and not 0 < iso < math.inf:
+        raise FsidError(f"--iso {iso:g}: must be a number above 0")
+    if iso is not None and profile is None:
+        raise FsidError("--iso: names a level of a camera; give --profile too (fsid profiles lists them)")
+
+
 def noise_of(raw: Raw, profile: str | None, iso: float | None, path: Path) -> Noise:
     """The level of a profile at an ISO (by default the file's), else the file's own, else the image's."""
+    _check_iso(profile, iso)
     if profile is not None:
         iso = iso if iso is not None else raw.iso
         if not iso > 0:
-            raise FsidError(f"{path}: its ISO is unknown, give --iso with a number above 0")
+            raise FsidError(f"{path}: its ISO is unknown, give --iso")
         return Noise(load_bayer_profile(profile).level(iso), f"profile {profile} at ISO {iso:g}")
-    if iso is not None:
-        raise FsidError("--iso: names a level of a camera; give --profile too (fsid profiles lists them)")
     if raw.noise is not None:
         return Noise(raw.noise, "the file's NoiseProfile")
     try:
@@ -144,7 +175,8 @@ def denoise_folder(
 ) -> None:
     """Denoise each of `sources` into a DNG of its name in the folder `target`, which is made.
 
-    failed: told of each file that cannot be denoised; FsidError says in the end how many they were.
+    failed: told of each file that cannot be denoised; FsidError says in the end how many they were. What is
+    wrong with all of them `check_options` tells before.
     """
     names = [source.stem for source in sources]
     if twice := sorted({name for name in names if names.count(name) > 1}):
@@ -152,6 +184,7 @@ def denoise_folder(
     targets = [target / f"{name}.dng" for name in names]
     if {path.resolve() for path in targets} & {path.resolve() for path in sources}:
         raise FsidError(f"{target}: is the folder of the originals, which would be overwritten")
+    is_new = not target.exists()
     try:
         target.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -166,4 +199,7 @@ def denoise_folder(
         if progress is not None:
             progress(done + 1, len(sources))
     if failures:
+        if is_new and failures == len(sources):
+            with contextlib.suppress(OSError):  # something else came to lie in it
+                target.rmdir()
         raise FsidError(f"{failures} of {len(sources)} files could not be denoised")
