@@ -205,6 +205,20 @@ def test_progress_replaces_the_live_line_and_quiet_is_silent(
     assert capfd.readouterr() == ("", "")
     train(data, tmp_path / "c", CONFIG)
     assert "PSNR" in "".join(capfd.readouterr())
+    train(data, tmp_path / "c", CONFIG)  # done already: no step has figures to show
+    shown = "".join(capfd.readouterr())
+    assert "8/8" in shown
+    assert "PSNR" not in shown
+
+
+def test_a_training_that_validates_nothing_says_so(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    rng = np.random.default_rng(4)
+    for images, kept, is_noted in ((4, 8, True), (4, 0, False), (5, 8, False)):
+        folder = tmp_path / f"{images}-{kept}"
+        folder.mkdir()
+        write_shard(shard_path(folder, 0), [stored(rng, number) for number in range(images)])
+        train(folder, folder / "run", replace(CONFIG, steps=1, held_out=kept))
+        assert capfd.readouterr().err.count("none is held out for validation") == is_noted
 
 
 def test_a_folder_is_one_training_s_at_a_time(data: Path, tmp_path: Path) -> None:

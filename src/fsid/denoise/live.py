@@ -19,14 +19,14 @@ class LiveLine:
             TextColumn("train"),
             BarColumn(bar_width=20),
             MofNCompleteColumn(),
-            TextColumn("loss {task.fields[loss]:.3f}  PSNR {task.fields[psnr]:.2f} dB"),
+            TextColumn("{task.fields[figures]}"),
             TextColumn("{task.fields[held_out]}"),
             TextColumn("{task.fields[rate]}"),
             TimeRemainingColumn(),
         )
         self._progress = Progress(*columns, disable=quiet)
         self._task = self._progress.add_task(
-            "train", total=config.steps, completed=step, loss=0.0, psnr=0.0, rate="", held_out=""
+            "train", total=config.steps, completed=step, figures="", rate="", held_out=""
         )
         self._batch = config.batch * processes
         self._shown: tuple[float, float] | None = None
@@ -47,7 +47,8 @@ class LiveLine:
         self._shown = loss, psnr
         speed = self._progress.tasks[0].speed
         rate = f"{speed * self._batch:.0f} patches/s" if speed else ""
-        self._progress.update(self._task, completed=step, loss=loss, psnr=psnr, rate=rate)
+        figures = f"loss {loss:.3f}  PSNR {psnr:.2f} dB"
+        self._progress.update(self._task, completed=step, figures=figures, rate=rate)
 
     def validated(self, psnr: float) -> None:
         """PSNR in dB on the held-out scenes."""

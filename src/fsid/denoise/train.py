@@ -23,6 +23,8 @@ from pathlib import Path
 import numpy as np
 import torch
 from accelerate import Accelerator
+from rich.console import Console
+from rich.text import Text
 from torch import Tensor
 
 from fsid.config import load_settings, read_yaml, save_settings, to_plain
@@ -77,6 +79,9 @@ def train(
     if resume and is_main and not (run_dir / CONFIG_FILE).is_file():
         raise FsidError(f"{run_dir}: holds no training to resume")
     initial = initial_network(run_dir, config, resume=resume)
+    shown = is_main and not quiet and progress is None
+    if shown and config.held_out and not kept:
+        _note_nothing_held_out(data_dir)
     with held(run_dir, "another fsid train is at work in it") if is_main else nullcontext():
         with accelerator.main_process_first():
             _prepare_run(data_dir, run_dir, config, initial)
@@ -86,7 +91,6 @@ def train(
         state = load_checkpoint(run_dir, bare, optimizer)
         forward = torch.compile(net) if _compiles(config) else net
         feed = batches(patches, range(state.step, config.steps), config.loader_processes, pin=gpu)
-        shown = is_main and not quiet and progress is None
         with LiveLine(config, state.step, accelerator.num_processes, quiet=not shown) as live:
             card = _card(data_dir, config, patches.mosaics, initial)
             keeper = _Keeper(data_dir, run_dir, config, accelerator, card, command, state, live)
@@ -250,6 +254,11 @@ def _prepare_run(data_dir: Path, run_dir: Path, config: TrainConfig, initial: De
             keep_initial(run_dir, initial)
     except OSError as error:
         raise FsidError(f"{run_dir}: cannot be written ({error.strerror})") from None
+
+
+def _note_nothing_held_out(data_dir: Path) -> None:
+    line = f"note: {data_dir} holds fewer than five images: none is held out for validation, and {MODEL_FILE}"
+    Console(stderr=True).print(Text(f"{line} is the network at the last step"), soft_wrap=True)
 
 
 def _patch_config(config: TrainConfig, held_out_images: int) -> PatchConfig:
