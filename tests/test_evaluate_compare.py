@@ -182,7 +182,14 @@ def test_a_narrow_table_loses_no_level(small_set: Path, capsys, monkeypatch):
     assert "…" not in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("option", ["photos --frames 3", "photos --material fabric", "from-bursts --iso 800"])
+@pytest.mark.parametrize(
+    "option",
+    [
+        *("photos --frames 3", "photos --material fabric", "photos --scenes 3", "photos --width 1024"),
+        *("photos --height 64", "from-bursts --iso 800", "from-bursts --seed 0", "from-bursts --width 64"),
+        "from-bursts --scenes 2",
+    ],
+)
 def test_options_without_effect_are_refused(photos: Path, tmp_path: Path, option: str, capsys):
     source, name, value = option.split()
     with pytest.raises(SystemExit) as stop:

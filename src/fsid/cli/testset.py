@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -29,12 +29,12 @@ def testset(
     camera: str = "",
     iso: tuple[int, ...] = (),
     lux: tuple[float, ...] = (),
-    frames: int = 1,
-    scenes: int = 3,
-    width: int = 1024,
-    height: int = 768,
+    frames: int | None = None,
+    scenes: int | None = None,
+    width: int | None = None,
+    height: int | None = None,
     material: tuple[str, ...] = (),
-    seed: int = 0,
+    seed: int | None = None,
     quiet: bool = False,
 ) -> None:
     """Make a RAW test set: a truth per image, and noisy captures per light level.
@@ -51,18 +51,20 @@ def testset(
         iso: ISO of each light level (photos: 800 1600 3200 6400 where neither ISO nor lux is given).
         lux: Light levels in lux: auto-exposure of the camera (exposures up to 1/10 s) makes them ISOs
             (simulate: 0.5 1 2 5 where neither is given).
-        frames: Noisy frames per image and level (simulate, from-bursts).
-        scenes: Pictures per material (simulate).
-        width: Width of a picture in pixels (simulate).
-        height: Height of a picture in pixels (simulate).
+        frames: Noisy frames per image and level (simulate, from-bursts; default 1).
+        scenes: Pictures per material (simulate; default 3).
+        width: Width of a picture in pixels (simulate; default 1024).
+        height: Height of a picture in pixels (simulate; default 768).
         material: Materials to draw (simulate; default all ten).
-        seed: Seed of drawing, white balance, colour matrix and noise.
+        seed: Seed of drawing, white balance, colour matrix and noise (photos, simulate; default 0).
         quiet: No progress bar.
     """
     from fsid.evaluate import burst_testset, photo_testset, simulated_testset
 
     _check_folders(source, folders)
-    _check_options(source, {"--iso": iso, "--lux": lux, "--material": material, "--frames": frames != 1})
+    numbers = {"frames": frames, "scenes": scenes, "width": width, "height": height, "seed": seed}
+    given = {name: number for name, number in numbers.items() if number is not None}
+    _check_options(source, {"iso": iso, "lux": lux, "material": material}, given)
     if source != "from-bursts":
         camera = camera or "pixel6"
     if source == "simulate":
@@ -73,22 +75,18 @@ def testset(
                 luxes=lux,
                 isos=iso,
                 materials=material,
-                frames=frames,
-                scenes=scenes,
-                width=width,
-                height=height,
-                seed=seed,
                 progress=progress,
+                **given,
             )
     elif source == "from-bursts":
         with progress_bar("bursts", "bursts", quiet=quiet) as progress:
-            made, found = burst_testset(folders[0], output, camera=camera, frames=frames, progress=progress)
+            made, found = burst_testset(folders[0], output, camera=camera, progress=progress, **given)
         Console(markup=False).print(_table(found))
     else:
         isos = iso if iso or lux else DEFAULT_ISOS
         with progress_bar("photographs", "photographs", quiet=quiet) as progress:
             made = photo_testset(
-                folders, output, camera=camera, isos=isos, luxes=lux, seed=seed, progress=progress
+                folders, output, camera=camera, isos=isos, luxes=lux, progress=progress, **given
             )
     if camera:
         note_files(camera, made.captures(output), quiet=quiet)
@@ -103,12 +101,13 @@ def _check_folders(source: str, folders: tuple[Path, ...]) -> None:
         raise FsidError("fsid testset from-bursts: give one folder, <scene>/<level>/frames inside")
 
 
-def _check_options(source: str, given: dict[str, object]) -> None:
+def _check_options(source: str, lists: Mapping[str, Sequence[object]], numbers: Mapping[str, int]) -> None:
     """Refuse what would do nothing: a set that looks right would lack it."""
-    without = {"photos": ("--material", "--frames"), "from-bursts": ("--iso", "--lux", "--material")}
-    for option in without.get(source, ()):
-        if given[option]:
-            raise FsidError(f"{option}: fsid testset {source} has no use for it; leave it out")
+    drawn = {"material", "scenes", "width", "height"}
+    useless = {"photos": {*drawn, "frames"}, "from-bursts": {*drawn, "iso", "lux", "seed"}}.get(source, set())
+    for option in (*(name for name, values in lists.items() if values), *numbers):
+        if option in useless:
+            raise FsidError(f"--{option}: fsid testset {source} has no use for it; leave it out")
 
 
 def _table(found: Sequence[TruthQuality]) -> Table:
