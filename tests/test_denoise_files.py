@@ -224,6 +224,32 @@ def test_a_folder_of_bare_mosaics(
     assert read_raw(tmp_path / "out" / "a.dng").cfa == "GBRG"
 
 
+def test_options_of_bare_mosaics_are_for_these_alone(
+    tmp_path: Path, noisy_file: Path, network: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def refused(source: Path, *options: str) -> str:
+        with pytest.raises(SystemExit):
+            main(["denoise", str(source), str(tmp_path / "out.dng"), "--model", str(network), *options])
+        (line,) = capsys.readouterr().err.splitlines()
+        return line
+
+    levels = ("--cfa", "RGGB", "--black-level", "64", "--white-level", "1023")
+    for options in (("--width", "320"), ("--height", "256"), levels):
+        line = refused(noisy_file, *options)
+        assert f"{options[0]}: is for bare mosaics" in line
+        assert f"not for {noisy_file}" in line
+    assert "holds no bare mosaic" in refused(tmp_path, "--width", "320")
+    for name in ("a", "b"):
+        np.full((48, 64), 500, "<u2").tofile(tmp_path / f"{name}.raw")
+    for source in (tmp_path, tmp_path / "a.raw"):
+        assert "a.raw: a headerless mosaic needs --width and --height" in refused(source, *levels)
+        assert "needs all three" in refused(source, "--width", "64", "--height", "48")
+    command = ["denoise", str(tmp_path), str(tmp_path / "out"), "--model", str(network), "--quiet", *levels]
+    command += ["--profile", "pixel6", "--iso", "800"]
+    main([*command, "--width", "64", "--height", "48"])
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["a.dng", "b.dng"]
+
+
 def test_what_no_reader_would_open_is_not_written(tmp_path: Path, network: Path) -> None:
     np.save(tmp_path / "tiny.npy", np.full((20, 64), 500, np.uint16))
     layout = Layout(None, "RGGB", 64, 1023)

@@ -284,6 +284,7 @@ def test_bad_bursts_are_named(tmp_path, dng_bursts, rng):
     _fails("at least one burst", [])
     _fails("no dark frames and no black level", good, layout=replace(LAYOUT, black_level=None))
     _fails("states its CFA", [light], layout=LAYOUT)
+    _fails("levels and size itself", [light], layout=Layout(width=192))
     _fails("frame and as a dark frame", [light], dark=[light / "000.dng"])
     _fails("not dark", [light], dark=[shutil.copytree(light, tmp_path / "lit")])
     moved = write_arrays(tmp_path / "moved", [np.roll(image, 12 * n, 1) for n, image in enumerate(ramp)])

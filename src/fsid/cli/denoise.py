@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -58,9 +60,13 @@ def denoise(
         quiet: No progress bar, no line on the noise level.
     """
     from fsid.denoise import check_options, denoise_file, denoise_folder, find_raws, load_model
+    from fsid.sensor import Layout
 
-    layout = _layout(cfa, black_level, white_level, width, height)
+    given = Layout(None, cfa, black_level, white_level, width, height)
+    layout = given if given != Layout() else None
     sources = find_raws(input, bare=layout is not None) if input.is_dir() else None
+    if layout is not None:
+        _check_layout(layout, sources or [input])
     network = load_model(model, backend)
     check_options(profile, iso, strength, layout)
     console = Console(stderr=True)
@@ -110,17 +116,21 @@ def _note_left_out(folder: Path, output: Path, *, bare: bool) -> None:
         Console(stderr=True).print(Text(f"{line}; give each folder by itself"), soft_wrap=True)
 
 
-def _layout(
-    cfa: str | None, black_level: int | None, white_level: int | None, width: int | None, height: int | None
-) -> Layout | None:
-    from fsid.sensor import Layout
+def _check_layout(layout: Layout, paths: Sequence[Path]) -> None:
+    """FsidError where `paths` need no layout, or more of it, or where it is none."""
+    from fsid.sensor.bare import BARE_SUFFIXES, HEADERLESS_SUFFIXES
     from fsid.sensor.mosaic import check_cfa
     from fsid.sensor.quantise import check_levels
 
-    if cfa is None and black_level is None and white_level is None:
-        return None
-    if cfa is None or black_level is None or white_level is None:
+    given = next(key for key, value in asdict(layout).items() if value is not None).replace("_", "-")
+    for path in paths:
+        kind = path.suffix.lower()
+        if kind not in BARE_SUFFIXES:
+            kinds = ", ".join(BARE_SUFFIXES)
+            raise FsidError(f"--{given}: is for bare mosaics ({kinds}), not for {path}; leave it out")
+        if kind in HEADERLESS_SUFFIXES and None in (layout.width, layout.height):
+            raise FsidError(f"{path}: a headerless mosaic needs --width and --height")
+    if layout.cfa is None or layout.black_level is None or layout.white_level is None:
         raise FsidError("a bare mosaic needs all three: --cfa, --black-level and --white-level")
-    check_cfa(cfa, "--cfa")
-    check_levels(black_level, white_level, "--black-level and --white-level")
-    return Layout(None, cfa, black_level, white_level, width, height)
+    check_cfa(layout.cfa, "--cfa")
+    check_levels(layout.black_level, layout.white_level, "--black-level and --white-level")

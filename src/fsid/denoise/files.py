@@ -24,7 +24,7 @@ from fsid.sensor import (
     read_raw,
     write_dng,
 )
-from fsid.sensor.bare import BARE_SUFFIXES
+from fsid.sensor.bare import BARE_SUFFIXES, HEADERLESS_SUFFIXES
 
 RAW_SUFFIXES = frozenset(
     """.3fr .arw .cr2 .cr3 .crw .dcr .dng .erf .fff .iiq .k25 .kdc .mef .mos .mrw .nef .nrw .orf .pef .raf
@@ -78,7 +78,7 @@ def read_input(path: Path, layout: Layout | None) -> Raw:
     if layout is not None:
         return layout.read(path)
     if path.suffix.lower() in BARE_SUFFIXES:
-        size = " --width PX --height PX" if path.suffix.lower() in (".raw", ".bin") else ""
+        size = " --width PX --height PX" if path.suffix.lower() in HEADERLESS_SUFFIXES else ""
         raise FsidError(
             f"{path}: is a bare mosaic, say what it holds: --cfa RGGB --black-level DN --white-level DN{size}"
         )

@@ -28,7 +28,8 @@ BEYOND_WHITE, BEYOND_WHITE_SHARE = 1.1, 0.001  # of the range; of the values: th
 logging.getLogger("tifffile").setLevel(
     logging.CRITICAL
 )  # what is wrong with a file is said in one line, here
-BARE_SUFFIXES = (".raw", ".bin", ".npy", ".png", ".tif", ".tiff")
+HEADERLESS_SUFFIXES = (".raw", ".bin")
+BARE_SUFFIXES = (*HEADERLESS_SUFFIXES, ".npy", ".png", ".tif", ".tiff")
 
 
 @dataclass(frozen=True)
@@ -133,7 +134,7 @@ def check_white(dn: np.ndarray, black_level: int, white_level: int, path: str | 
 
 def _read(path: Path, cfa: str | None, width: int | None, height: int | None) -> np.ndarray:
     kind = path.suffix.lower()
-    if kind in (".raw", ".bin"):
+    if kind in HEADERLESS_SUFFIXES:
         return _read_headerless(path, width, height)
     if kind not in BARE_SUFFIXES:
         raise FsidError(f"{path}: unknown kind of mosaic file; use .raw, .bin, .npy, .png or .tif")

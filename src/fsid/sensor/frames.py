@@ -145,8 +145,10 @@ def _raw_frames(paths: Sequence[Path], dark: Sequence[Path], layout: Layout) -> 
                 f"calibrate one camera at a time"
             )
     camera = Camera(first.camera, first.cfa, first.black_level, first.white_level, bare=False)
-    if layout.cfa is not None or layout.black_level is not None or layout.white_level is not None:
-        raise FsidError(f"{paths[0]}: a RAW file states its CFA and levels itself; leave the options out")
+    if replace(layout, iso=None) != Layout():
+        raise FsidError(
+            f"{paths[0]}: a RAW file states its CFA, levels and size itself; leave the options out"
+        )
 
     def frame(path: Path) -> Frame:
         header: RawHeader = headers[path]
