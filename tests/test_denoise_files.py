@@ -292,6 +292,21 @@ def test_what_ships_is_found_by_name_and_by_default(
         np.testing.assert_allclose(denoise_raw(raw, model).mosaic, expected, atol=1e-3)
 
 
+@pytest.mark.parametrize("letters", [248, 300])
+def test_a_name_of_any_length_is_a_network_or_none(tmp_path: Path, network: Path, letters: int) -> None:
+    """248 letters are a name that a folder may have, but no file with .safetensors behind it."""
+    run = tmp_path / ("x" * letters)
+    for missing in (run, run.name):
+        with pytest.raises(FsidError, match="x: no such file"):
+            load_model(missing)
+    with pytest.raises(FsidError, match="x' is neither a file nor one of the built-in"):
+        load_profile(run.name)
+    if letters < 255:
+        run.mkdir()
+        (run / model_module.MODEL_FILE).write_bytes(network.read_bytes())
+        assert load_model(run).card == CARD
+
+
 def test_the_python_interface(noisy_file: Path, network: Path) -> None:
     raw, model = fsid.read_raw(noisy_file), fsid.load_model(network)
     clean = fsid.denoise(raw, model=model)

@@ -48,7 +48,7 @@ def experiment(
         photos: Folder of photographs to train the real rival on (real-vs-synthetic only).
         test: Folders of photographs to measure on; none of them may be trained on.
         count: Pairs per source of data.
-        steps: Training steps.
+        steps: Training steps; 0 takes the number that the network's configuration has.
         network: Training configuration, built-in name or file.
         seeds: One training per source and seed.
         width: Width of a training frame in pixels; photographs are cut to no less than 1024.

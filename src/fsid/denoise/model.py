@@ -8,6 +8,7 @@ that a user hands over is ever unpickled. A readable copy of the card is written
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib.resources import files
@@ -113,12 +114,12 @@ def model_path(run_or_file: str | Path | None) -> Path:
     """The file of a network: of a run folder, a shipped one by its name, a file; None is `DEFAULT_MODEL`."""
     name = str(run_or_file or DEFAULT_MODEL)
     shipped = WEIGHTS / f"{name}.safetensors"
-    if shipped.is_file():
+    if os.path.isfile(shipped):  # unlike Path.is_file, False for a name that is too long, too
         return shipped
     if run_or_file is None:
         raise FsidError("no network ships with this version of FSID; give one with --model RUN or FILE")
     path = Path(run_or_file)
-    return path / MODEL_FILE if path.is_dir() else path
+    return path / MODEL_FILE if os.path.isdir(path) else path
 
 
 def load_denoiser(run_or_file: str | Path | None = None, device: str | torch.device = "cpu") -> Denoiser:
@@ -180,7 +181,7 @@ def write_tensors(path: Path, tensors: Mapping[str, Tensor], header: Mapping[str
 
 def read_tensors(path: Path, expected: str) -> tuple[dict[str, Tensor], dict[str, str]]:
     """Tensors and header of a safetensors file; FsidError says that `path` is not `expected`."""
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise FsidError(f"{path}: no such file; expected {expected}")
     try:
         with safe_open(path, framework="pt") as file:

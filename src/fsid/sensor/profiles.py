@@ -12,6 +12,7 @@ beyond k and sigma2 (see `terms`); without it the model is the paper's. Own prof
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict
 from importlib.resources import files
@@ -145,7 +146,7 @@ def _rounded(values: np.ndarray) -> list[float]:
 
 
 def _read(path: Path) -> str:
-    if not path.is_file():
+    if not os.path.isfile(path):  # unlike Path.is_file, False for a name that is too long, too
         names = ", ".join(profile_names())
         raise FsidError(f"profile {str(path)!r} is neither a file nor one of the built-in profiles: {names}")
     try:
