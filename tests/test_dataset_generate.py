@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -13,9 +14,20 @@ import numpy as np
 import pytest
 import rawpy
 import webdataset
+import yaml
+from PIL import Image
 
+from fsid.cli.main import main
 from fsid.config import load_settings, read_yaml
-from fsid.dataset import GenerateConfig, dataset_config, generate, read_member, shard_keys, shard_path
+from fsid.dataset import (
+    GenerateConfig,
+    dataset_config,
+    generate,
+    make_only,
+    read_member,
+    shard_keys,
+    shard_path,
+)
 from fsid.errors import FsidError
 
 SMALL = ["width=128", "height=96"]
@@ -71,15 +83,17 @@ def test_another_configuration_in_the_same_folder_is_refused(scenes: Path):
 
 
 def test_the_corrected_command_goes_into_the_folder_of_the_one_that_failed(photos: Path, tmp_path: Path):
-    tiny = ("width=32", "height=32", f"images={photos}")
-    with pytest.raises(FsidError, match="deblur"):
-        generate(tmp_path, small(*tiny, "task=deblur"), count=1)
-    assert generate(tmp_path, small(*tiny), count=1) == 1
-    assert read_yaml(tmp_path / "config.yaml")["generate"]["task"] == "denoise"
-    shard_path(tmp_path, 0).unlink()
-    (tmp_path / "00000000.clean.dng").touch()
-    with pytest.raises(FsidError, match=r"generate\.task"):
-        generate(tmp_path, small(*tiny, "task=deblur"), count=1)
+    tiny, night, data = ("width=32", "height=32"), tmp_path / "night", tmp_path / "data"
+    night.mkdir()
+    Image.new("RGB", (64, 64)).save(night / "dark.png")
+    with pytest.raises(FsidError, match=r"frame 0 \(.*night/dark\.png\): 8 attempts were refused \(black"):
+        generate(data, small(*tiny, f"images={night}"), count=1)
+    assert generate(data, small(*tiny, f"images={photos}"), count=1) == 1
+    assert read_yaml(data / "config.yaml")["generate"]["images"] == str(photos)
+    shard_path(data, 0).unlink()
+    (data / "00000000.clean.dng").touch()
+    with pytest.raises(FsidError, match=r"generate\.images"):
+        generate(data, small(*tiny, f"images={night}"), count=1)
 
 
 def test_settings_of_something_else_are_not_replaced(photos: Path, tmp_path: Path):
@@ -181,6 +195,84 @@ def test_crops_may_be_as_many_as_there_are_windows(overrides: tuple[str, ...]):
 def test_more_crops_than_windows_are_named_before_anything_is_written(tmp_path: Path):
     with pytest.raises(FsidError, match="crops: 2"):
         generate(tmp_path / "out", small("crops=2"), count=1)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.fixture
+def album(photos: Path, tmp_path: Path) -> Path:
+    """A folder of three photographs that a test may change."""
+    return Path(shutil.copytree(photos, tmp_path / "album"))
+
+
+def test_pictures_that_changed_are_not_mixed_into_a_dataset(album: Path, tmp_path: Path):
+    out, config = tmp_path / "out", small(f"images={album}")
+    generate(out, config, count=2)
+    first = album / "coffee-0.png"
+    pixels = Image.open(first)
+    pixels.crop((0, 0, 128, 128)).save(first)
+    with pytest.raises(FsidError, match=r"album: holds other pictures .* 3 then, 3 now"):
+        generate(out, config, count=4)
+    for key in ("00000000", "00000009"):
+        with pytest.raises(FsidError, match="album: holds other pictures"):
+            make_only(out, key, None, None)
+    pixels.save(first)
+    assert generate(out, config, count=4) == 4
+    first.rename(album / "later.png")
+    with pytest.raises(FsidError, match="album: holds other pictures"):
+        generate(out, config, count=6)
+    record = tmp_path / "00000000.json"
+    record.write_bytes(read_member(shard_path(out, 0), "00000000.json"))
+    with pytest.raises(FsidError, match=r"made from coffee-0\.png, but .*album now has coffee-1\.png"):
+        make_only(tmp_path / "again", str(record), None, None)
+
+
+def test_a_dataset_of_before_pictures_were_told_apart_goes_on(album: Path, tmp_path: Path):
+    out, config = tmp_path / "out", small(f"images={album}")
+    generate(out, config, count=1)
+    plain = read_yaml(out / "config.yaml")
+    assert len(plain.pop("pictures_digest")) == 16
+    old = yaml.safe_dump(plain)
+    (out / "config.yaml").write_text(old)
+    (album / "coffee-0.png").rename(album / "coffee.png")
+    assert generate(out, config, count=2) == 2
+    assert make_only(out, "1", None, None)
+    assert (out / "config.yaml").read_text() == old
+    (album / "coffee.png").unlink()
+    with pytest.raises(FsidError, match="3 then, 2 now"):
+        generate(out, config, count=2)
+
+
+def test_unusable_pictures_are_named_before_anything_is_written(
+    album: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    whole = Image.open(album / "coffee-1.png")
+    whole.save(album / "cut.jpg", quality=95)
+    (album / "cut.jpg").write_bytes((album / "cut.jpg").read_bytes()[:4000])
+    (album / "text.webp").write_text("no picture")
+    Image.new("RGB", (64, 20)).save(album / "low.png")
+    (album / "render.exr").write_bytes(b"v/1\x01")
+    command = ["generate", str(tmp_path / "out"), "--count", "1", "--images", str(album), "--quiet"]
+    with pytest.raises(SystemExit) as stop:
+        main([*command, "--workers", "2"])
+    line = capsys.readouterr().err
+    assert stop.value.code == 2
+    assert "4 of 7 pictures cannot be used" in line
+    assert all(name in line for name in ("cut.jpg", "text.webp", "low.png: is 64x20", "render.exr"))
+    assert line.strip().count("\n") == 0
+    assert not (tmp_path / "out").exists()
+    for name in ("cut.jpg", "text.webp", "low.png", "render.exr"):
+        (album / name).unlink()
+    main(command)
+    assert len(shard_keys(shard_path(tmp_path / "out", 0))) == 1
+
+
+def test_pictures_are_no_source_for_some_tasks(album: Path, tmp_path: Path):
+    """Whichever of them is the photograph: it is said at once, and not when its turn comes."""
+    with pytest.raises(FsidError, match="needs scenes, in which"):
+        generate(tmp_path / "out", small(f"images={album}", "task=deblur"), count=1)
+    (album / "a.exr").touch()
+    with pytest.raises(FsidError, match=r"coffee-0\.png: --task super-resolution needs"):
+        generate(tmp_path / "out", small(f"images={album}", "task=super-resolution"), count=1)
     assert not (tmp_path / "out").exists()
 
 

@@ -79,7 +79,7 @@ def generate(
         dry_run: Measure a few pairs, print the estimated time, size and number of shards, and write nothing.
         quiet: No progress bar.
     """
-    from fsid.dataset import Workforce, dataset_config, generate_config, make_only
+    from fsid.dataset import Workforce, dataset_config, generate_config, is_begun, make_only
 
     given = {
         "width": width,
@@ -103,15 +103,25 @@ def generate(
         raise FsidError("--count: say how many pairs the dataset is to have, at least 1")
     seed = seed or 0
     settings, workforce = generate_config(config, overrides), Workforce(workers, ray, workers_per_gpu)
-    dataset_config(settings, seed)  # names what does not exist before a library of meshes is read
+    dataset = dataset_config(settings, seed)  # names what does not exist before a library of meshes is read
     note_extrapolation(settings.cameras, *settings.iso_range, quiet=quiet)
     if not settings.images:
         read_mesh_folders(settings.scene, quiet=quiet)
     if dry_run:
         Console().print(_plan(out, settings, count, seed, workforce), soft_wrap=True)
     else:
+        if settings.images and not is_begun(out, dataset):
+            _check_pictures(Path(settings.images), workers, quiet=quiet)
         made = _make(out, settings, count, seed, workforce, quiet=quiet)
         console.print(f"{out}: {count} pairs, {made} of them new")
+
+
+def _check_pictures(folder: Path, workers: int, *, quiet: bool) -> None:
+    """Behind a progress bar, on as many cores as there are workers."""
+    from fsid.dataset import check_pictures, find_pictures
+
+    with progress_bar(f"checking {folder}", "pictures", quiet=quiet) as progress:
+        check_pictures(find_pictures(folder), min(workers, os.cpu_count() or 1), progress)
 
 
 def _make(

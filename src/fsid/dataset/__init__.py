@@ -3,11 +3,11 @@
 from fsid.dataset.attempt import Sample, sample_key
 from fsid.dataset.config import DatasetConfig, GenerateConfig, generate_config
 from fsid.dataset.estimate import Estimate, estimate
-from fsid.dataset.generate import Workforce, dataset_config, generate
+from fsid.dataset.generate import Workforce, dataset_config, generate, is_begun
 from fsid.dataset.only import make_only
 from fsid.dataset.photos import find_photos, read_photo
 from fsid.dataset.picture import check_png, contact_sheet, grid, save_png
-from fsid.dataset.pictures import find_pictures
+from fsid.dataset.pictures import check_pictures, find_pictures
 from fsid.dataset.sample import encode, make_frame, make_sample, remake, scene_of, to_uint8
 from fsid.dataset.shards import find_shards, read_member, shard_keys, shard_path, write_shard
 
@@ -17,6 +17,7 @@ __all__ = [
     "GenerateConfig",
     "Sample",
     "Workforce",
+    "check_pictures",
     "check_png",
     "contact_sheet",
     "dataset_config",
@@ -28,6 +29,7 @@ __all__ = [
     "generate",
     "generate_config",
     "grid",
+    "is_begun",
     "make_frame",
     "make_only",
     "make_sample",

@@ -20,8 +20,14 @@ from fsid.config import to_plain
 from fsid.dataset.checks import distance, fingerprint, flaw
 from fsid.dataset.config import GenerateConfig, split_of
 from fsid.dataset.pictures import find_pictures, read_picture
-from fsid.dataset.tasks import SceneRenderer, Views, scene_config, views_of_light, views_of_scene
-from fsid.errors import FsidError
+from fsid.dataset.tasks import (
+    SceneRenderer,
+    Views,
+    check_task,
+    scene_config,
+    views_of_light,
+    views_of_scene,
+)
 from fsid.scene import Scene
 from fsid.scene import sample as sample_scene
 from fsid.sensor import (
@@ -103,6 +109,12 @@ class Attempt:
             scene_config(config), seed, width=config.width, height=config.height, variant=config.variant
         )
 
+    def drawn_picture(self) -> tuple[int, Path]:
+        """The picture that this attempt takes, and its number in `config.images`."""
+        paths = find_pictures(Path(self.config.images))
+        number = self.frame % len(paths)
+        return number, paths[number]
+
     def _is_old(self, looks: list[str]) -> bool:
         near = self.config.checks.duplicate_bits
         return any(distance(looks[-1], other) <= near for other in looks[:-1])
@@ -115,13 +127,11 @@ class Attempt:
             scene = self.drawn_scene()
             facts = {"split": split_of(config, self.frame), "scene": to_plain(scene)}
             return _Source(views_of_scene(rng, config, scene, renderer), facts, is_linear=True)
-        paths = find_pictures(Path(config.images))
-        number = self.frame % len(paths)
-        picture = read_picture(paths[number])
+        number, path = self.drawn_picture()
+        check_task(config, [path])
+        picture = read_picture(path)
         window = _window_rand(self._rng(_SCENE), picture.pixels, config.width, config.height, step=2)
-        facts = {"split": split_of(config, number), "image": picture.path.name}
-        if not picture.is_linear and config.task == "super-resolution":
-            raise FsidError(f"--task {config.task}: needs scenes or linear .exr pictures, not photographs")
+        facts = {"split": split_of(config, number), "image": path.name}
         return _Source(views_of_light(rng, config, _cut(picture.pixels, window)), facts, picture.is_linear)
 
     def _shot(self, source: _Source, number: int) -> _Shot:

@@ -149,13 +149,15 @@ class GenerateConfig:
 class DatasetConfig:
     """What `config.yaml` beside the shards says: the identity of the dataset.
 
-    pictures: how many there are in the folder `generate.images`; 0 for scenes.
+    pictures: how many there are in the folder `generate.images`; 0 for scenes. pictures_digest: of their
+    names and sizes; "" for scenes, and unknown in what FSID wrote before it was recorded.
     """
 
     seed: int
     shard_size: int
     generate: GenerateConfig
     pictures: int = 0
+    pictures_digest: str = ""
 
     def __post_init__(self) -> None:
         if self.seed < 0:

@@ -17,11 +17,11 @@ from fsid.config import from_plain, read_yaml, save_settings, to_plain
 from fsid.dataset.card import CARD, write_card
 from fsid.dataset.config import DatasetConfig, GenerateConfig
 from fsid.dataset.crew import Crew, LocalCrew, run
-from fsid.dataset.pictures import find_pictures
+from fsid.dataset.pictures import find_pictures, pictures_digest
 from fsid.dataset.sample import encode, make_frame
 from fsid.dataset.settle import Settle, settle
 from fsid.dataset.shards import remove_parts, shard_keys, shard_path, write_shard
-from fsid.dataset.tasks import check_cameras
+from fsid.dataset.tasks import check_cameras, check_task
 from fsid.dataset.worker import Worker
 from fsid.errors import FsidError
 from fsid.files import held
@@ -108,7 +108,8 @@ def generate(
     workforce = workforce or Workforce(workers)
     dataset = dataset_config(config, seed, shard_size)
     with _locked(out):
-        _claim(out, dataset)
+        if not is_begun(out, dataset):
+            save_settings(dataset, out / "config.yaml")
         todo = list(_missing(out, dataset, count))
         total = sum(len(shard.indices) for shard in todo)
         done = count - total
@@ -146,12 +147,14 @@ def dataset_config(config: GenerateConfig, seed: int, shard_size: int = 0) -> Da
             f"crops: {config.crops}, but crop_width and crop_height leave {config.windows} different ones, "
             "and near-duplicates are refused"
         )
-    pictures = len(find_pictures(Path(config.images))) if config.images else 0
+    pictures = find_pictures(Path(config.images)) if config.images else []
+    check_task(config, pictures)
     pairs = config.pairs_per_frame
     shard_size = shard_size or -(-SHARD_SIZE // pairs) * pairs
     if shard_size < 1 or shard_size % pairs:
         raise FsidError(f"shard size {shard_size}: is not a multiple of the {pairs} pairs of a frame")
-    return DatasetConfig(seed, shard_size, config, pictures)
+    digest = pictures_digest(pictures) if pictures else ""
+    return DatasetConfig(seed, shard_size, config, len(pictures), digest)
 
 
 @contextmanager
@@ -173,23 +176,39 @@ def _withdraw_card(out: Path) -> None:
         raise FsidError(f"{out}: cannot be written ({error.strerror})") from None
 
 
-def _claim(out: Path, dataset: DatasetConfig) -> None:
-    """`out` is of `dataset`, whatever a run that failed before its first shard left there."""
+def is_begun(out: Path, dataset: DatasetConfig) -> bool:
+    """Whether the config.yaml of `out` is that of `dataset`; FsidError where `out` has samples of another.
+
+    Without samples there is no other, whatever a run that failed before its first shard left there.
+    """
     file = out / "config.yaml"
     if not file.exists():
-        save_settings(dataset, file)
-        return
+        return False
     there = _used(from_plain(DatasetConfig, read_yaml(file), source=str(file)))
-    here = _used(dataset)
-    if there == here:
+    here = _used(dataset if there.pictures_digest else replace(dataset, pictures_digest=""))
+    if there == here or not (any(out.glob("shard-*.tar")) or any(out.glob("*.clean.dng"))):
+        return there == here
+    if there.generate == here.generate and there.seed == here.seed:
+        check_same_pictures(out, there)
+    keys = ", ".join(_differing(to_plain(there), to_plain(here)))
+    raise FsidError(
+        f"{out}: already holds another dataset; these differ: {keys}. "
+        "Use another folder, or the same settings"
+    )
+
+
+def check_same_pictures(out: Path, dataset: DatasetConfig) -> None:
+    """FsidError unless the pictures of `dataset`, in `out`, are those that it was begun with, if known."""
+    if not dataset.generate.images:
         return
-    if any(out.glob("shard-*.tar")) or any(out.glob("*.clean.dng")):
-        keys = ", ".join(_differing(to_plain(there), to_plain(here)))
+    pictures = find_pictures(Path(dataset.generate.images))
+    digest = dataset.pictures_digest and pictures_digest(pictures)
+    if (len(pictures), digest) != (dataset.pictures, dataset.pictures_digest):
         raise FsidError(
-            f"{out}: already holds another dataset; these differ: {keys}. "
-            "Use another folder, or the same settings"
+            f"{dataset.generate.images}: holds other pictures than those that {out} was begun with (names or "
+            f"sizes differ; {dataset.pictures} then, {len(pictures)} now); "
+            "put those back, or use another folder"
         )
-    save_settings(dataset, file)
 
 
 def _used(dataset: DatasetConfig) -> DatasetConfig:

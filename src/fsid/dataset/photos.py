@@ -32,15 +32,28 @@ def files_inside(folder: Path, suffixes: tuple[str, ...]) -> list[Path]:
 
 def read_photo(path: Path) -> np.ndarray:
     """(H, W, 3) float32 sRGB-encoded 0..1, upright, cropped to even size; FsidError where unreadable."""
+    pixels = _read(path)
+    height, width = (size // 2 * 2 for size in pixels.shape[:2])
+    return pixels[:height, :width]
+
+
+def check_photo(path: Path) -> None:
+    """FsidError where `read_photo` has one; a JPEG takes a quarter of its time, others little less."""
+    _read(path, shrink=8)
+
+
+def _read(path: Path, shrink: int = 1) -> np.ndarray:
+    """As `read_photo`; a JPEG `shrink` times smaller, which its decoder does quickly."""
     try:
         with Image.open(path) as image:
-            pixels = _decoded(image)
+            width, height = image.size
+            if min(width, height) < 32:
+                raise FsidError(f"{path}: is {width}x{height} pixels, at least 32x32 are needed")
+            if shrink > 1:
+                image.draft(image.mode, (width // shrink, height // shrink))
+            return _decoded(image)
     except (OSError, SyntaxError, ValueError, struct.error, Image.DecompressionBombError) as error:
         raise FsidError(f"{path}: cannot be read as a photograph ({error})") from None
-    height, width = (size // 2 * 2 for size in pixels.shape[:2])
-    if min(height, width) < 32:
-        raise FsidError(f"{path}: is {pixels.shape[1]}x{pixels.shape[0]} pixels, at least 32x32 are needed")
-    return pixels[:height, :width]
 
 
 def _decoded(image: Image.Image) -> np.ndarray:

@@ -6,17 +6,23 @@ the way of a rendered frame: exposed, seen by the camera, and no curve is invert
 
 from __future__ import annotations
 
+import hashlib
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from fsid.dataset.photos import PHOTO_SUFFIXES, files_inside, read_photo
+from fsid.dataset.photos import PHOTO_SUFFIXES, check_photo, files_inside, read_photo
 from fsid.errors import FsidError
 
 EXR_SUFFIX = ".exr"
 _SRGB_CHROMATICITIES = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
 _SMALLEST_PX = 32
+_NAMED = 5
+"""So many unusable pictures are named."""
 _BEAUTY = "Combined"
 """Blender's name of the layer that holds all light."""
 
@@ -41,9 +47,52 @@ def find_pictures(folder: Path) -> list[Path]:
     return pictures
 
 
+def is_render(path: Path) -> bool:
+    """Whether a picture is an .exr render, which holds linear light, and no photograph."""
+    return path.suffix.lower() == EXR_SUFFIX
+
+
+def pictures_digest(pictures: Sequence[Path]) -> str:
+    """16 hexadecimal digits that tell pictures from others: of their names and sizes in bytes, in order."""
+    facts = (b"%s\0%d\0" % (os.fsencode(p.name), p.stat().st_size if p.exists() else -1) for p in pictures)
+    return hashlib.sha256(b"".join(facts)).hexdigest()[:16]
+
+
+def check_pictures(
+    pictures: Sequence[Path], threads: int, progress: Callable[[int, int], None] = lambda done, total: None
+) -> None:
+    """Decode every picture once; FsidError that names those which `read_picture` refuses.
+
+    For 1,000 photographs of 12 megapixels one core takes about 40 s if they are JPEG, 5 min if PNG.
+    """
+    faults = []
+    with ThreadPoolExecutor(threads) as pool:
+        for done, fault in enumerate(pool.map(_fault, pictures), 1):
+            faults += [fault] if fault else []
+            progress(done, len(pictures))
+    if faults:
+        more = f" and {len(faults) - _NAMED} more" if len(faults) > _NAMED else ""
+        raise FsidError(
+            f"{len(faults)} of {len(pictures)} pictures cannot be used, mend them or move them elsewhere: "
+            f"{'; '.join(faults[:_NAMED])}{more}"
+        )
+
+
+def _fault(path: Path) -> str:
+    """What is wrong with a picture, "" for nothing."""
+    try:
+        if is_render(path):
+            read_exr(path)
+        else:
+            check_photo(path)
+    except FsidError as error:
+        return str(error)
+    return ""
+
+
 def read_picture(path: Path) -> Picture:
     """A photograph or a render, upright, cropped to even size; FsidError where it is unreadable."""
-    if path.suffix.lower() == EXR_SUFFIX:
+    if is_render(path):
         return Picture(path, read_exr(path), is_linear=True)
     return Picture(path, read_photo(path), is_linear=False)
 

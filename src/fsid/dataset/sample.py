@@ -57,8 +57,9 @@ def make_frame(
         if isinstance(samples, list):
             return samples
         refused = (*refused, samples)
+    source = f" ({Attempt(config, seed, frame).drawn_picture()[1]})" if config.images else ""
     raise FsidError(
-        f"frame {frame}: {ATTEMPTS} attempts were refused ({', '.join(refused)}); "
+        f"frame {frame}{source}: {ATTEMPTS} attempts were refused ({', '.join(refused)}); "
         "loosen `checks` or change what is drawn"
     )
 
@@ -76,6 +77,12 @@ def remake(record: dict[str, Any], renderer: SceneRenderer | None) -> Sample:
     samples = attempt.samples(renderer)
     if isinstance(samples, str):
         raise FsidError(f"sample {sample_key(index)}: cannot be made again, the checks now find it {samples}")
+    made = samples[place].record.get("image")
+    if made != record.get("image"):
+        raise FsidError(
+            f"sample {sample_key(index)}: was made from {record.get('image')}, but {config.images} now has "
+            f"{made} in its place; put its pictures back"
+        )
     return samples[place]
 
 

@@ -13,13 +13,16 @@ filters. Motion of camera and objects is the scene's (`scene.motion`).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any, Protocol, cast
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
 from fsid.dataset.config import GenerateConfig
+from fsid.dataset.pictures import is_render
 from fsid.errors import FsidError
 from fsid.render import Frame
 from fsid.scene import Scene, SceneConfig
@@ -69,6 +72,17 @@ def check_cameras(config: GenerateConfig) -> None:
         )
 
 
+def check_task(config: GenerateConfig, pictures: Sequence[Path]) -> None:
+    """FsidError where `pictures` are no source for the task of `config`."""
+    if pictures and config.task in ("deblur", "burst"):
+        raise FsidError(f"--task {config.task}: needs scenes, in which things move, and not pictures")
+    photograph = next((path for path in pictures if not is_render(path)), None)
+    if photograph and config.task == "super-resolution":
+        raise FsidError(
+            f"{photograph}: --task {config.task} needs scenes or linear .exr pictures, not photographs"
+        )
+
+
 def scene_config(config: GenerateConfig) -> SceneConfig:
     """`config.scene` with the motion that the task needs, where it has none: a shutter time, or a burst."""
     scene, motion = config.scene, config.scene.motion
@@ -93,12 +107,10 @@ def views_of_scene(
 
 
 def views_of_light(rng: np.random.Generator, config: GenerateConfig, light: np.ndarray) -> Views:
-    """The views of linear light (H, W, 3) alone; FsidError where a task needs a scene."""
-    if config.task == "denoise":
-        return Views(light, (light,))
+    """The views of linear light (H, W, 3) alone, for a task that needs no motion."""
     if config.task == "super-resolution":
         return smaller(rng, light, config.scale)
-    raise FsidError(f"--task {config.task}: needs scenes, in which things move, and not pictures")
+    return Views(light, (light,))
 
 
 def smaller(rng: np.random.Generator, truth: np.ndarray, scale: int) -> Views:
