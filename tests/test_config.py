@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from fsid.config import Override, from_plain, load_settings, save_settings
+from fsid.config import Override, from_plain, given_keys, load_settings, save_settings
 from fsid.errors import FsidError
 
 
@@ -130,3 +130,8 @@ def test_a_refusal_says_where_the_value_came_from(tmp_path: Path) -> None:
     for config, overrides, named in wrong:
         with pytest.raises(FsidError, match=named):
             load_settings(Outer, config, overrides)
+
+
+def test_given_keys_are_single_settings_also_inside_of_groups():
+    given: list[Override] = ["inner.rate=2", "inner={rate: 3, names: [x]}", ("count", 4), "inner={}"]
+    assert given_keys(given) == ["inner.rate", "inner.rate", "inner.names", "count"]

@@ -13,10 +13,10 @@ import tifffile
 from PIL import ExifTags, Image, ImageOps
 from scipy.ndimage import gaussian_filter, map_coordinates
 
-from fsid.config import load_settings
-from fsid.dataset import GenerateConfig, Sample, encode, make_sample, read_photo
+from fsid.config import given_keys, load_settings
+from fsid.dataset import GenerateConfig, Sample, check_given, encode, make_sample, read_photo
 from fsid.dataset.pictures import read_exr
-from fsid.dataset.tasks import BURST_FRAMES
+from fsid.dataset.tasks import BURST_FRAMES, scene_config
 from fsid.errors import FsidError
 from fsid.render import Renderer
 from fsid.sensor import Raw, clean_from_linear, exposure_rand, load_profile, pack
@@ -92,6 +92,16 @@ def test_the_flow_of_a_burst_leads_each_frame_to_the_first(renderer: Renderer) -
 def green(raw: Raw) -> np.ndarray:
     """Half-size green without most of the noise."""
     return gaussian_filter(pack(raw.mosaic, raw.cfa)[1], 1.5)
+
+
+def test_a_motion_of_one_s_own_is_taken_as_it_is_and_nothing_replaces_what_was_asked_for() -> None:
+    still = ("task=deblur", "scene.motion.moving_share=0")
+    with pytest.raises(FsidError, match=r"moving_share: .* take 0\.3 .*give scene\.motion\.exposure_s"):
+        check_given(config(*still), given_keys(still))
+    shaken = (*still, "scene.motion.exposure_s=[0.1,0.1]")
+    check_given(config(*shaken), given_keys(shaken))
+    assert scene_config(config(*shaken)).motion == config(*shaken).scene.motion
+    check_given(config(*still), [])  # stated by a file: as if it were not
 
 
 def test_things_that_move_need_scenes(photos: Path) -> None:

@@ -10,7 +10,7 @@ defaults.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar, get_args, get_origin
 
@@ -127,6 +127,20 @@ def load_settings(kind: type[T], file: Path | None = None, overrides: Sequence[O
         _assign(plain, key.split("."), value)
         sources.append("--set" if isinstance(override, str) else "options")
     return from_plain(kind, plain, source=" and ".join(dict.fromkeys(sources)) or "defaults")
+
+
+def given_keys(overrides: Sequence[Override]) -> list[str]:
+    """The dotted keys of single settings in `overrides`, also of those that are given as a group."""
+
+    def leaves(key: str, value: Any) -> Iterator[str]:
+        if not isinstance(value, Mapping):
+            yield key
+            return
+        for name, inner in value.items():
+            yield from leaves(f"{key}.{name}", inner)
+
+    pairs = (_parse_override(item) if isinstance(item, str) else item for item in overrides)
+    return [leaf for key, value in pairs for leaf in leaves(key, value)]
 
 
 def read_yaml(file: Path) -> dict[str, Any]:

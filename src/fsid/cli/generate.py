@@ -79,7 +79,8 @@ def generate(
         dry_run: Measure a few pairs, print the estimated time, size and number of shards, and write nothing.
         quiet: No progress bar.
     """
-    from fsid.dataset import Workforce, dataset_config, generate_config, is_begun, make_only
+    from fsid.config import given_keys
+    from fsid.dataset import Workforce, check_given, dataset_config, generate_config, is_begun, make_only
 
     given = {
         "width": width,
@@ -94,15 +95,16 @@ def generate(
     console = Console(stderr=True, quiet=quiet)
     if only and dry_run:
         raise FsidError("--dry-run: says what a dataset takes, not one sample; leave out --only")
+    settings = generate_config(config, overrides)
+    check_given(settings, given_keys(overrides))
     if only:
-        settings = generate_config(config, overrides) if config or overrides else None
-        for path in make_only(out, only, settings, seed):
+        for path in make_only(out, only, settings if config or overrides else None, seed):
             console.print(str(path), soft_wrap=True)
         return
     if count is None or count < 1:
         raise FsidError("--count: say how many pairs the dataset is to have, at least 1")
     seed = seed or 0
-    settings, workforce = generate_config(config, overrides), Workforce(workers, ray, workers_per_gpu)
+    workforce = Workforce(workers, ray, workers_per_gpu)
     dataset = dataset_config(settings, seed)  # names what does not exist before a library of meshes is read
     note_extrapolation(settings.cameras, *settings.iso_range, quiet=quiet)
     if not settings.images:

@@ -4,6 +4,7 @@ from fsid.dataset.attempt import Sample, sample_key
 from fsid.dataset.config import DatasetConfig, GenerateConfig, generate_config
 from fsid.dataset.estimate import Estimate, estimate
 from fsid.dataset.generate import Workforce, dataset_config, generate, is_begun
+from fsid.dataset.given import check_given
 from fsid.dataset.only import make_only
 from fsid.dataset.photos import find_photos, read_photo
 from fsid.dataset.picture import check_png, contact_sheet, grid, save_png
@@ -17,6 +18,7 @@ __all__ = [
     "GenerateConfig",
     "Sample",
     "Workforce",
+    "check_given",
     "check_pictures",
     "check_png",
     "contact_sheet",
