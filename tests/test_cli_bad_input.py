@@ -59,6 +59,28 @@ CASES = [
     ("generate {0}/out --count 1 --task deblur --set scene.motion.moving_share=0", "take 0.3 instead"),
     ("generate {0}/out --count 1 --task burst --set scene.motion.frames=1", "take 5 instead of 1"),
     ("generate {0}/out --count 1 --seed -1", "seed -1: must not be negative"),
+    *(
+        (f"generate {{0}}/out --count 1 --images {{0}} {option}", f"{key}: has no effect on pictures")
+        for option, key in (
+            ("--variant full", "variant"),
+            ("--renderer raster", "renderer"),
+            ("--quality high", "quality"),
+            ("--set scene.objects=[1,2]", "scene.objects"),
+            ("--set checks.duplicate_bits=4", "checks.duplicate_bits"),
+        )
+    ),
+    ("generate {0}/out --count 1 --set scale=2", "scale: has no effect on --task denoise"),
+    ("generate {0}/out --count 1 --task deblur --set scale=4", "scale: has no effect on --task deblur"),
+    ("generate {0}/out --count 1 --set scene.motion.frames=2", "frames: has no effect on --task denoise"),
+    ("generate {0}/out --count 1 --task deblur --set scene.motion.frames=2", "frames: has no effect on"),
+    ("generate {0}/out --count 1 --set scene.motion.moving_share=1", "moving_share: has no effect on"),
+    (
+        "generate {0}/out --count 1 --renderer reference --quality fast",
+        "quality: has no effect on",
+    ),
+    ("generate {0}/out --only {0}/a.json --count 1", "a.json: the file says all"),
+    ("generate {0}/out --only {0}/a.json --seed 0", "a.json: the file says all"),
+    ("generate {0}/out --only {0}/a.json --width 64", "a.json: the file says all"),
     ("preview {0}/out.png --seed -1", "seed -1"),
     ("demo -o {0}/out --seed -1", "seed -1"),
     ("testset photos {0} -o {0}/out --seed -1", "seed -1"),

@@ -17,6 +17,7 @@ from fsid.cli.main import main
 from fsid.cli.progress import progress_bar
 from fsid.config import read_yaml
 from fsid.dataset import contact_sheet, generate_config, make_only, shard_path, write_shard
+from fsid.dataset.index import index_mosaics
 from fsid.dataset.sample import make_sample, to_uint8
 from fsid.dataset.shards import read_samples
 from fsid.errors import FsidError
@@ -58,6 +59,31 @@ def test_only_makes_the_same_bytes_from_a_key_and_from_json(data: Path, tmp_path
     assert loose(tmp_path / "again", "00000003") == stored
     main([*(word.replace("/data", "/elsewhere") for word in words(data)), "--only", "3"])
     assert loose(data / "elsewhere", "00000003") == stored
+
+
+def test_only_says_that_a_sample_is_not_there_yet(
+    data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of a mistyped key, nobody would see it; its files are no part of the dataset."""
+    out = Path(shutil.copytree(data / "data", tmp_path / "data"))
+    for key, words_ in (("00000004", ""), ("00000005", "has sample 00000005 yet")):
+        main(["generate", str(out), "--only", key])
+        said = capsys.readouterr().err
+        assert words_ in said
+        assert ("note:" in said) == bool(words_)
+    assert len(index_mosaics(out)) == 5
+    main([*words(data)[:1], str(out), *words(data)[2:], "--count", "6"])
+    assert loose(out, "00000005") == read_samples(shard_path(out, 0))["00000005"]
+    main(["generate", str(tmp_path / "fresh"), "--only", "0", "--images", str(data / "pictures")])
+    assert "note:" not in capsys.readouterr().err
+
+
+def test_what_changes_nothing_may_stand_in_a_file(data: Path, tmp_path: Path) -> None:
+    """Only single settings are refused: every config.yaml states some that have no effect."""
+    (tmp_path / "c.yaml").write_text(f"variant: objects\nscale: 4\nimages: {data / 'pictures'}\n")
+    options = ["--count", "1", "--width", "32", "--height", "32", "--quiet"]
+    main(["generate", str(tmp_path / "out"), "--config", str(tmp_path / "c.yaml"), *options])
+    assert len(index_mosaics(tmp_path / "out")) == 1
 
 
 @pytest.mark.parametrize("option", [["--seed", "5"], ["--width", "64"]])

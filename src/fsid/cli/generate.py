@@ -6,6 +6,7 @@ import os
 import shlex
 import shutil
 import sys
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -75,7 +76,7 @@ def generate(
         workers_per_gpu: How many workers share a GPU: worker w renders on GPU w // N, on a cluster on the one
             that Ray assigns. 0: every worker takes the first there is.
         only: Key of one sample (00000012), or the path of its KEY.json: make that one alone, as loose
-            files in OUT.
+            files in OUT, which are no part of the dataset.
         dry_run: Measure a few pairs, print the estimated time, size and number of shards, and write nothing.
         quiet: No progress bar.
     """
@@ -95,11 +96,15 @@ def generate(
     console = Console(stderr=True, quiet=quiet)
     if only and dry_run:
         raise FsidError("--dry-run: says what a dataset takes, not one sample; leave out --only")
+    if only.endswith(".json") and (config or overrides or (count, seed) != (None, None)):
+        raise FsidError(f"--only {only}: the file says all of it; leave out --count, --seed and settings")
     settings = generate_config(config, overrides)
     check_given(settings, given_keys(overrides))
     if only:
-        for path in make_only(out, only, settings if config or overrides else None, seed):
-            console.print(str(path), soft_wrap=True)
+        stated = settings if config or overrides else None
+        say = partial(console.print, soft_wrap=True, markup=False)
+        for path in make_only(out, only, stated, seed, note=say):
+            say(str(path))
         return
     if count is None or count < 1:
         raise FsidError("--count: say how many pairs the dataset is to have, at least 1")

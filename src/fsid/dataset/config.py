@@ -18,6 +18,8 @@ from fsid.scene import VARIANTS, SceneConfig
 TASKS = ("denoise", "super-resolution", "deblur", "burst")
 RENDERERS = ("raster", "reference")
 QUALITIES = ("high", "fast")
+RENDERED = ("variant", "renderer", "quality", "supersampling", "lens_images", "texture_size", "scene")
+"""Settings that pictures do not depend on: these are not rendered."""
 _POSITIVE = ("crops", "exposures", "noise_levels", "lens_images")
 _HIGHEST_ISO = 10_000_000
 _LARGEST_PX = 16384

@@ -15,7 +15,7 @@ from pathlib import Path
 from fsid.assets import sky_sources
 from fsid.config import from_plain, read_yaml, save_settings, to_plain
 from fsid.dataset.card import CARD, write_card
-from fsid.dataset.config import DatasetConfig, GenerateConfig
+from fsid.dataset.config import RENDERED, DatasetConfig, GenerateConfig
 from fsid.dataset.crew import Crew, LocalCrew, run
 from fsid.dataset.pictures import find_pictures, pictures_digest
 from fsid.dataset.sample import encode, make_frame
@@ -216,8 +216,7 @@ def _used(dataset: DatasetConfig) -> DatasetConfig:
     config, unused = dataset.generate, GenerateConfig()
     if not config.images:
         return dataset
-    keys = ("variant", "renderer", "quality", "supersampling", "lens_images", "texture_size", "scene")
-    return replace(dataset, generate=replace(config, **{key: getattr(unused, key) for key in keys}))
+    return replace(dataset, generate=replace(config, **{key: getattr(unused, key) for key in RENDERED}))
 
 
 def _differing(there: dict, here: dict, path: str = "") -> Iterator[str]:

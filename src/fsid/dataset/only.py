@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from fsid.config import from_plain, read_yaml
-from fsid.dataset.attempt import SAMPLE_KEY, Sample
+from fsid.dataset.attempt import SAMPLE_KEY, Sample, sample_key
 from fsid.dataset.config import DatasetConfig, GenerateConfig
 from fsid.dataset.generate import check_same_pictures, dataset_config
 from fsid.dataset.sample import encode, make_sample, remake
@@ -16,18 +17,25 @@ from fsid.errors import FsidError
 from fsid.files import write_atomically
 
 
-def make_only(out: Path, key: str, config: GenerateConfig | None, seed: int | None) -> list[Path]:
+def make_only(
+    out: Path,
+    key: str,
+    config: GenerateConfig | None,
+    seed: int | None,
+    note: Callable[[str], None] = lambda line: None,
+) -> list[Path]:
     """Make the sample `key` into `out` as KEY.clean.dng, KEY.noisy.dng ...; the paths of its files.
 
     key: of a sample, or the path of its .json. config, seed: of the dataset; None takes those of the dataset
     in `out`, or the defaults where there is none. Where the sample is in a shard of `out`, its record says
-    what it is, redrawn or not. FsidError: unusable key or settings, or others than those of the dataset.
+    what it is, redrawn or not; where there are shards and none of them has it, note(line) is called.
+    FsidError: unusable key or settings, or others than those of the dataset.
     """
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise FsidError(f"{out}: cannot be written ({error.strerror})") from None
-    sample = _from_json(Path(key)) if key.endswith(".json") else _from_key(out, key, config, seed)
+    sample = _from_json(Path(key)) if key.endswith(".json") else _from_key(out, key, config, seed, note)
     paths = []
     for extension, data in encode(sample).items():
         paths.append(out / f"{sample.key}.{extension}")
@@ -43,7 +51,9 @@ def _from_json(file: Path) -> Sample:
     return _remake(read_record(data, str(file)), str(file))
 
 
-def _from_key(out: Path, key: str, config: GenerateConfig | None, seed: int | None) -> Sample:
+def _from_key(
+    out: Path, key: str, config: GenerateConfig | None, seed: int | None, note: Callable[[str], None]
+) -> Sample:
     if not SAMPLE_KEY.fullmatch(key):
         raise FsidError(f"--only {key}: is neither the key of a sample, like 00000012, nor a .json file")
     index, file = int(key), out / "config.yaml"
@@ -63,6 +73,8 @@ def _from_key(out: Path, key: str, config: GenerateConfig | None, seed: int | No
             ) from None
         if found is not None:
             return _remake(found, f"{shard}: sample {index}")
+        if any(out.glob("shard-*.tar")):
+            note(f"note: no shard of {out} has sample {sample_key(index)} yet; this is what it would be")
     config, seed = config or GenerateConfig(), seed or 0
     dataset_config(config, seed)  # names what does not exist
     with rendering(config) as renderer:
