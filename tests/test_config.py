@@ -121,15 +121,34 @@ def test_a_missing_file_is_named(tmp_path: Path):
 def test_a_refusal_says_where_the_value_came_from(tmp_path: Path) -> None:
     """A command's own options are handed over as pairs; nobody wrote --set for these."""
     file = tmp_path / "mine.yaml"
-    file.write_text("{}")
+    file.write_text("count: 2")
     wrong: list[tuple[Path | None, list[Override], str]] = [
         (None, [("count", "x")], "options: count"),
         (None, ["count=x"], "--set: count"),
-        (file, ["count=x", ("wide", True)], "mine.yaml and --set and options: count"),
+        (file, ["count=x", ("wide", True)], "--set: count"),
+        (file, ["count=4", ("wide", 3)], "options: wide"),
+        (file, ["nonsense=1", ("wide", True)], "--set: no such key: nonsense"),
+        (None, ["inner={rate: x}", "wide=true", ("inner.rate", "y")], "options: inner.rate"),
     ]
     for config, overrides, named in wrong:
-        with pytest.raises(FsidError, match=named):
+        with pytest.raises(FsidError, match=rf"^{named}"):
             load_settings(Outer, config, overrides)
+
+
+def test_a_file_that_is_at_fault_is_named_alone_or_with_its_accomplice(tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text("inner: 3")
+    with pytest.raises(FsidError, match=r"^\S*mine\.yaml: inner: "):
+        load_settings(Outer, file, ["count=4", ("wide", True)])
+    with pytest.raises(FsidError, match=r"mine\.yaml and --set: inner\.rate: inner is a single value"):
+        load_settings(Outer, file, ["inner.rate=4", ("wide", True)])
+
+
+def test_the_advice_for_a_list_is_one_of_the_right_length():
+    with pytest.raises(FsidError, match=r"size_m: 5 is not a list; write \[5,5\]") as caught:
+        load_settings(Outer, None, ["size_m=5"])
+    advice = str(caught.value).rpartition(" ")[2]
+    assert load_settings(Outer, None, [f"size_m={advice}"]).size_m == (5.0, 5.0)
 
 
 def test_given_keys_are_single_settings_also_inside_of_groups():

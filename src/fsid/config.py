@@ -9,8 +9,9 @@ defaults.
 
 from __future__ import annotations
 
+import copy
 import dataclasses
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar, get_args, get_origin
 
@@ -23,6 +24,8 @@ from fsid.files import write_atomically
 T = TypeVar("T")
 Override = str | tuple[str, Any]
 """A text `key=value`, whose value is YAML, or a pair (key, value), whose value is taken as it is."""
+Layer = tuple[str, list[str], Any]
+"""One setting: its source, the path of its key and its value."""
 
 
 def _strict_int(value: Any, _: type) -> int:
@@ -51,9 +54,10 @@ def _strict_str(value: Any, _: type) -> str:
 
 def _strict_tuple(value: Any, kind: Any) -> tuple[Any, ...]:
     """A text is a list of letters for Python; a folder without brackets must not become "/" and "."."""
-    if not isinstance(value, list | tuple):
-        raise ValueError(f"{value!r} is not a list; write [{value}]")
     kinds = get_args(kind)
+    if not isinstance(value, list | tuple):
+        advice = ",".join([str(value)] * (1 if kinds[-1] is ... else len(kinds)))
+        raise ValueError(f"{value!r} is not a list; write [{advice}]")
     kinds = (kinds[0],) * len(value) if kinds[-1] is ... else kinds
     if len(kinds) != len(value):
         raise ValueError(f"{value!r} is not a list of {len(kinds)}")
@@ -118,31 +122,6 @@ def _first_refusal(error: BaseException) -> FsidError | None:
     return None
 
 
-def load_settings(kind: type[T], file: Path | None = None, overrides: Sequence[Override] = ()) -> T:
-    """Settings of dataclass `kind` from an optional YAML file and overrides, of which the last wins."""
-    plain = {} if file is None else read_yaml(file)
-    sources = [] if file is None else [str(file)]
-    for override in overrides:
-        key, value = _parse_override(override) if isinstance(override, str) else override
-        _assign(plain, key.split("."), value)
-        sources.append("--set" if isinstance(override, str) else "options")
-    return from_plain(kind, plain, source=" and ".join(dict.fromkeys(sources)) or "defaults")
-
-
-def given_keys(overrides: Sequence[Override]) -> list[str]:
-    """The dotted keys of single settings in `overrides`, also of those that are given as a group."""
-
-    def leaves(key: str, value: Any) -> Iterator[str]:
-        if not isinstance(value, Mapping):
-            yield key
-            return
-        for name, inner in value.items():
-            yield from leaves(f"{key}.{name}", inner)
-
-    pairs = (_parse_override(item) if isinstance(item, str) else item for item in overrides)
-    return [leaf for key, value in pairs for leaf in leaves(key, value)]
-
-
 def read_yaml(file: Path) -> dict[str, Any]:
     """A YAML mapping, loaded safely; FsidError where it is missing, broken or something else."""
     try:
@@ -157,6 +136,55 @@ def read_yaml(file: Path) -> dict[str, Any]:
     if not isinstance(plain, dict):
         raise FsidError(f"{file}: expected 'key: value' lines, found {type(plain).__name__}")
     return plain
+
+
+def load_settings(
+    kind: type[T],
+    file: Path | None = None,
+    overrides: Sequence[Override] = (),
+    read: Callable[[Path], dict[str, Any]] = read_yaml,
+) -> T:
+    """Settings of dataclass `kind` from an optional YAML file and overrides, of which the last wins.
+
+    read: the file. FsidError names the sources at fault, without which there would be none, or another.
+    """
+    layers: list[Layer] = []
+    if file is not None:
+        layers += [(str(file), [key], value) for key, value in read(file).items()]
+    for override in overrides:
+        key, value = _parse_override(override) if isinstance(override, str) else override
+        layers.append(("--set" if isinstance(override, str) else "options", key.split("."), value))
+    settings, fault = _overlaid(kind, layers)
+    if settings is not None:
+        return settings
+    sources = list(dict.fromkeys(source for source, _, _ in layers))
+    guilty = [s for s in sources if _overlaid(kind, [x for x in layers if x[0] != s])[1] != fault]
+    raise FsidError(f"{' and '.join(guilty or sources) or 'defaults'}: {fault}")
+
+
+def _overlaid(kind: type[T], layers: Sequence[Layer]) -> tuple[T | None, str]:
+    """The settings of all layers, or None and what is wrong with them."""
+    plain: dict[str, Any] = {}
+    try:
+        for _, path, value in layers:
+            _assign(plain, path, copy.deepcopy(value))
+        return from_plain(kind, plain, source=""), ""
+    except FsidError as error:
+        return None, str(error).removeprefix(": ")
+
+
+def given_keys(overrides: Sequence[Override]) -> list[str]:
+    """The dotted keys of single settings in `overrides`, also of those that are given as a group."""
+
+    def leaves(key: str, value: Any) -> Iterator[str]:
+        if not isinstance(value, Mapping):
+            yield key
+            return
+        for name, inner in value.items():
+            yield from leaves(f"{key}.{name}", inner)
+
+    pairs = (_parse_override(item) if isinstance(item, str) else item for item in overrides)
+    return [leaf for key, value in pairs for leaf in leaves(key, value)]
 
 
 def save_settings(settings: Any, file: Path) -> None:
@@ -204,6 +232,6 @@ def _assign(plain: dict[str, Any], path: list[str], value: Any) -> None:
     for key in path[:-1]:
         inner = plain.setdefault(key, {})
         if not isinstance(inner, dict):
-            raise FsidError(f"--set {'.'.join(path)}: {key} is a single value, not a group of settings")
+            raise FsidError(f"{'.'.join(path)}: {key} is a single value, not a group of settings")
         plain = inner
     plain[path[-1]] = value
