@@ -32,6 +32,8 @@ def folder(tmp_path: Path) -> Path:
     (tmp_path / "text.dng").write_text("not a RAW")
     (tmp_path / "text.yaml").write_text("a: [")
     (tmp_path / "wrong.yaml").write_text("no_such_key: 1")
+    (tmp_path / "mixed.yaml").write_text("{seed: 1, shard_size: 2, generate: {width: 64}, width: 96}")
+    (tmp_path / "part.yaml").write_text("generate: 3")
     (tmp_path / "text.safetensors").write_text("not weights")
     (tmp_path / "empty").mkdir()
     np.save(tmp_path / "nan.npy", np.full((64, 64), np.nan, np.float32))
@@ -82,6 +84,9 @@ CASES = [
     ("generate {0}/out --only {0}/a.json --seed 0", "a.json: the file says all"),
     ("generate {0}/out --only {0}/a.json --width 64", "a.json: the file says all"),
     ("preview {0}/out.png --seed -1", "seed -1"),
+    ("preview {0}/out.png --set scene.objects=5", "fsid: --set: scene.objects: 5 is not a list; write [5,5]"),
+    ("generate {0}/out --count 1 --config {0}/mixed.yaml", "mixed.yaml: no such key: width"),
+    ("generate {0}/out --count 1 --config {0}/part.yaml --width 64", "part.yaml: seed"),
     ("demo -o {0}/out --seed -1", "seed -1"),
     ("testset photos {0} -o {0}/out --seed -1", "seed -1"),
     ("testset simulate -o {0}/out --seed -1", "seed -1"),

@@ -86,6 +86,21 @@ def test_what_changes_nothing_may_stand_in_a_file(data: Path, tmp_path: Path) ->
     assert len(index_mosaics(tmp_path / "out")) == 1
 
 
+def test_the_settings_of_a_dataset_make_it_grow_and_make_another(data: Path, tmp_path: Path) -> None:
+    out = Path(shutil.copytree(data / "data", tmp_path / "data"))
+    settings = ["--config", str(out / "config.yaml"), "--quiet"]
+    before = (out / "config.yaml").read_bytes()
+    main(["generate", str(out), "--count", "6", "--seed", "4", *settings])
+    assert (out / "config.yaml").read_bytes() == before
+    assert len(index_mosaics(out)) == 6
+    main(["generate", str(tmp_path / "other"), "--count", "1", *settings, "--set", "noise_levels=2"])
+    dataset = read_yaml(tmp_path / "other" / "config.yaml")
+    assert (dataset["seed"], dataset["generate"]) == (
+        0,
+        {**read_yaml(out / "config.yaml")["generate"], "noise_levels": 2},
+    )
+
+
 @pytest.mark.parametrize("option", [["--seed", "5"], ["--width", "64"]])
 def test_only_makes_nothing_of_another_dataset(
     data: Path, option: list[str], capsys: pytest.CaptureFixture[str]

@@ -58,7 +58,8 @@ def generate(
         out: Folder of the dataset.
         count: Number of pairs in the finished dataset.
         seed: Seed of the dataset; pair i depends on settings, seed and i alone (default 0).
-        config: YAML file of settings, or the name of a built-in one (fsid-175k: the paper's dataset).
+        config: YAML file of settings, the config.yaml of another dataset (but for its seed), or the name of a
+            built-in one (fsid-175k: the paper's dataset).
         set: Single settings, for example --set iso_range=[800,3200] scene.objects=[20,30] crops=4.
         width: Width of a frame in pixels (default 1920).
         height: Height of a frame in pixels (default 1080).

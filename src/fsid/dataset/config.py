@@ -10,8 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from importlib.resources import as_file, files
 from pathlib import Path
+from typing import Any
 
-from fsid.config import Override, load_settings
+from fsid.config import Override, from_plain, load_settings, read_yaml
 from fsid.errors import FsidError
 from fsid.scene import VARIANTS, SceneConfig
 
@@ -173,9 +174,21 @@ def split_of(config: GenerateConfig, number: int) -> str:
 
 
 def generate_config(name_or_file: str | Path | None, overrides: Sequence[Override] = ()) -> GenerateConfig:
-    """A built-in configuration by name (`fsid/configs`), or a YAML file; overrides on top."""
+    """A built-in configuration by name (`fsid/configs`), or a YAML file; overrides on top.
+
+    The file may be the config.yaml of a dataset: its settings are taken, its seed is not.
+    """
     builtin = files("fsid.configs").joinpath(f"{name_or_file}.yaml")
     if name_or_file is None or not builtin.is_file():
-        return load_settings(GenerateConfig, None if name_or_file is None else Path(name_or_file), overrides)
+        file = None if name_or_file is None else Path(name_or_file)
+        return load_settings(GenerateConfig, file, overrides, _read_settings)
     with as_file(builtin) as file:
         return load_settings(GenerateConfig, file, overrides)
+
+
+def _read_settings(file: Path) -> dict[str, Any]:
+    plain = read_yaml(file)
+    if "generate" not in plain:
+        return plain
+    from_plain(DatasetConfig, plain, source=str(file))  # whatever else it says must be of a dataset, too
+    return dict(plain["generate"])
