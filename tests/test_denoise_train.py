@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import shutil
 import signal
 import subprocess
 import sys
@@ -19,6 +20,7 @@ torch = pytest.importorskip("torch")
 
 from safetensors.torch import load_file, save_file  # noqa: E402
 
+from fsid.cli.main import main  # noqa: E402
 from fsid.config import load_settings, save_settings  # noqa: E402
 from fsid.dataset import DatasetConfig, GenerateConfig  # noqa: E402
 from fsid.dataset.shards import shard_path, write_shard  # noqa: E402
@@ -379,6 +381,23 @@ def test_shipped_configs_are_valid(name: str) -> None:
 def test_a_setting_that_no_training_survives_is_named(setting: str) -> None:
     with pytest.raises(FsidError, match=setting.partition("=")[0]):
         load_settings(TrainConfig, None, [setting])
+
+
+@pytest.mark.parametrize("task", ["denoise", "super-resolution", "deblur", "burst", None])
+def test_a_denoiser_from_pairs_for_something_else_is_said_to_be_one(
+    task: str | None, data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = Path(shutil.copytree(data, tmp_path / "data"))
+    if task:
+        save_settings(DatasetConfig(0, 4, GenerateConfig(task=task)), folder / "config.yaml")
+    save_settings(replace(CONFIG, steps=1), tmp_path / "train.yaml")
+    command = ["train", str(folder), "-o", str(tmp_path / "run"), "--config", str(tmp_path / "train.yaml")]
+    main(command)
+    said = capsys.readouterr().err
+    assert ("note:" in said) == (task not in ("denoise", None))
+    assert f"pairs for {task}, but this trains a denoiser" in said or "note:" not in said
+    main([*command, "--quiet"])
+    assert not capsys.readouterr().err
 
 
 def test_bad_input_is_named(data: Path, tmp_path: Path) -> None:

@@ -39,6 +39,7 @@ def train(
         resume: Continue the training in the folder with the settings that it has there.
         quiet: No progress line.
     """
+    from fsid.dataset.index import task_of
     from fsid.denoise import train as train_network
     from fsid.denoise import train_config
 
@@ -47,6 +48,14 @@ def train(
     settings = train_config(output / "config.yaml" if resume else config, set)
     is_main = os.environ.get("RANK", "0") == "0"
     note_extrapolation(settings.profiles, settings.iso_min, settings.iso_max, quiet=quiet or not is_main)
+    task = task_of(data)
+    if task != "denoise" and is_main and not quiet:
+        Console(stderr=True).print(
+            f"note: {data} holds pairs for {task}, but this trains a denoiser: "
+            "it takes their clean images alone and draws noise for them",
+            soft_wrap=True,
+            markup=False,
+        )
     command = shlex.join(["fsid", *sys.argv[1:]])
     model = train_network(data, output, settings, resume=resume, quiet=quiet, command=command)
     if not quiet and is_main:

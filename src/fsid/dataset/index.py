@@ -89,6 +89,13 @@ def identity(data_dir: Path) -> str:
         return hashlib.sha256(pixels.read(2 * first.height * first.width)).hexdigest()
 
 
+def task_of(data_dir: Path) -> str:
+    """What a dataset's pairs are for, as its config.yaml states; "denoise" where that states nothing."""
+    file = data_dir / "config.yaml"
+    settings = read_yaml(file).get("generate") if file.exists() else None
+    return str(settings.get("task", "denoise")) if isinstance(settings, dict) else "denoise"
+
+
 def _origin(data_dir: Path) -> Callable[[StoredMosaic], tuple[int, str]]:
     """Scene and split of a sample by its key, from the config.yaml of the dataset, where there is one."""
     file = data_dir / "config.yaml"
