@@ -251,18 +251,16 @@ def test_unusable_pictures_are_named_before_anything_is_written(
     (album / "text.webp").write_text("no picture")
     Image.new("RGB", (64, 20)).save(album / "low.png")
     (album / "render.exr").write_bytes(b"v/1\x01")
-    command = ["generate", str(tmp_path / "out"), "--count", "1", "--images", str(album), "--quiet"]
+    command = ["generate", str(tmp_path / "out"), "--images", str(album), "--quiet"]
     with pytest.raises(SystemExit) as stop:
-        main([*command, "--workers", "2"])
+        main([*command, "--count", "7", "--workers", "2"])
     line = capsys.readouterr().err
     assert stop.value.code == 2
     assert "4 of 7 pictures cannot be used" in line
     assert all(name in line for name in ("cut.jpg", "text.webp", "low.png: is 64x20", "render.exr"))
     assert line.strip().count("\n") == 0
     assert not (tmp_path / "out").exists()
-    for name in ("cut.jpg", "text.webp", "low.png", "render.exr"):
-        (album / name).unlink()
-    main(command)
+    main([*command, "--count", "1"])  # the first alone has a turn
     assert len(shard_keys(shard_path(tmp_path / "out", 0))) == 1
 
 

@@ -119,17 +119,18 @@ def generate(
         Console().print(_plan(out, settings, count, seed, workforce), soft_wrap=True)
     else:
         if settings.images and not is_begun(out, dataset):
-            _check_pictures(Path(settings.images), workers, quiet=quiet)
+            frames = -(-count // settings.pairs_per_frame)
+            _check_pictures(Path(settings.images), frames, workers, quiet=quiet)
         made = _make(out, settings, count, seed, workforce, quiet=quiet)
         console.print(f"{out}: {count} pairs, {made} of them new")
 
 
-def _check_pictures(folder: Path, workers: int, *, quiet: bool) -> None:
-    """Behind a progress bar, on as many cores as there are workers."""
+def _check_pictures(folder: Path, frames: int, workers: int, *, quiet: bool) -> None:
+    """Those of so many frames, behind a progress bar, on as many cores as there are workers."""
     from fsid.dataset import check_pictures, find_pictures
 
     with progress_bar(f"checking {folder}", "pictures", quiet=quiet) as progress:
-        check_pictures(find_pictures(folder), min(workers, os.cpu_count() or 1), progress)
+        check_pictures(find_pictures(folder)[:frames], min(workers, os.cpu_count() or 1), progress)
 
 
 def _make(
