@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -81,6 +82,17 @@ def test_a_small_image_is_what_the_bare_network_makes_of_it(rng: np.random.Gener
     expected = model.net(torch.from_numpy(packed)[None], k, sigma2)[0].numpy()
     clean = denoise_raw(noisy, model, tile_px=8).mosaic
     np.testing.assert_allclose(clean[::2, 1::2], expected[1], atol=1e-5)
+
+
+def test_threads_may_share_a_network(rng: np.random.Generator) -> None:
+    """Averages are held on the network itself: those of one image must not get into another's tiles."""
+    model = denoiser()
+    images = [replace(raw(rng, 96, 96), mosaic=share * raw(rng, 96, 96).mosaic) for share in (1.0, 0.5, 0.1)]
+    expected = [denoise_raw(image, model, tile_px=8).mosaic for image in images]
+    with ThreadPoolExecutor(3) as threads:
+        found = list(threads.map(lambda image: denoise_raw(image, model, tile_px=8).mosaic, images))
+    for mosaic, alone in zip(found, expected, strict=True):
+        np.testing.assert_array_equal(mosaic, alone)
 
 
 def test_progress_counts_tiles(rng: np.random.Generator) -> None:

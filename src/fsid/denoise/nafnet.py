@@ -16,6 +16,7 @@ there on a CPU, and the layer norm over channels becomes the fused norm over the
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
@@ -147,32 +148,44 @@ def receptive_radius(encoder: tuple[int, ...], middle: int, decoder: tuple[int, 
     return radius + 2
 
 
+_POOLING = threading.RLock()
+"""Hooks and constants are set on the modules themselves, which threads that share a network share too."""
+
+
 def spatial_means(net: nn.Module) -> list[SpatialMean]:
     """All of them, in the order in which the blocks were made."""
     return [module for module in net.modules() if isinstance(module, SpatialMean)]
 
 
 def pooling(net: nn.Module, run: Callable[[], object]) -> list[Tensor]:
-    """What the spatial means of `net` gave during the one call in `run()`, (B, C, 1, 1) each."""
+    """What the spatial means of `net` gave during the one call in `run()`, (B, C, 1, 1) each.
+
+    One thread at a time, as `frozen_pooling`.
+    """
     means = spatial_means(net)
     seen: dict[SpatialMean, Tensor] = {}
-    hooks = [mean.register_forward_hook(lambda m, _, out: seen.update({m: out})) for mean in means]
-    try:
-        run()
-    finally:
-        for hook in hooks:
-            hook.remove()
+    with _POOLING:
+        hooks = [mean.register_forward_hook(lambda m, _, out: seen.update({m: out})) for mean in means]
+        try:
+            run()
+        finally:
+            for hook in hooks:
+                hook.remove()
     return [seen[mean] for mean in means]
 
 
 @contextmanager
 def frozen_pooling(net: nn.Module, constants: Sequence[Tensor]) -> Iterator[None]:
-    """Inside this context the spatial means of `net` are `constants`, (1, C, 1, 1) each, see `pooling`."""
+    """Inside this context the spatial means of `net` are `constants`, (1, C, 1, 1) each, see `pooling`.
+
+    One thread at a time: another one waits here until this one is done.
+    """
     means = spatial_means(net)
-    try:
-        for mean, constant in zip(means, constants, strict=True):
-            mean.frozen = constant
-        yield
-    finally:
-        for mean in means:
-            mean.frozen = None
+    with _POOLING:
+        try:
+            for mean, constant in zip(means, constants, strict=True):
+                mean.frozen = constant
+            yield
+        finally:
+            for mean in means:
+                mean.frozen = None
