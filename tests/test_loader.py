@@ -296,7 +296,7 @@ def test_neighbours_of_an_order_are_unrelated() -> None:
 
 
 def test_real_processes_share_an_epoch(tmp_path: Path) -> None:
-    """torch.distributed (gloo) tells each of two processes how many there are."""
+    """torch.distributed (gloo) tells each of two processes how many there are, and which one it is."""
     (tmp_path / "data").mkdir()
     data = addresses(tmp_path / "data", (1, 4))
     store = f"file://{tmp_path / 'store'}"
@@ -309,7 +309,7 @@ def test_real_processes_share_an_epoch(tmp_path: Path) -> None:
 
 def take_part(rank: int, world: int, store: str, data: Path, out: Path) -> None:
     torch.distributed.init_process_group("gloo", init_method=store, rank=rank, world_size=world)
-    patches = PatchDataset(data, replace(CONFIG, size_px=6), seed=1, rank=rank)
+    patches = PatchDataset(data, replace(CONFIG, size_px=6), seed=1)
     steps = patches.patches // (world * CONFIG.batch)
     np.save(
         out / f"{rank}.npy", np.concatenate([np.concatenate(pixels_of(patches[s])) for s in range(steps)])

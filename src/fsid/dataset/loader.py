@@ -87,17 +87,24 @@ class PatchDataset(Dataset[Batch]):
     """`dataset[step]` is the batch of that step; see the module docstring. Validation scenes are left out.
 
     `feed.batches` has other processes make them. rank, world: this process among those that train together;
-    world None asks `torch.distributed`.
+    None asks `torch.distributed`, and is 0 of 1 where that was not set up.
     """
 
     def __init__(
-        self, data_dir: Path, config: PatchConfig, seed: int, rank: int = 0, world: int | None = None
+        self,
+        data_dir: Path,
+        config: PatchConfig,
+        seed: int,
+        rank: int | None = None,
+        world: int | None = None,
     ) -> None:
         if not config.profiles:
             raise FsidError("profiles: name at least one camera profile to draw noise from")
-        self._rank, self._world = rank, world or _world_size()
-        if not 0 <= rank < self._world:
-            raise FsidError(f"rank {rank}: is not one of the {self._world} processes that train together")
+        own_rank, all_ranks = _place_among_processes()
+        self._rank = own_rank if rank is None else rank
+        self._world = all_ranks if world is None else world
+        if not 0 <= self._rank < self._world:
+            raise FsidError(f"rank {self._rank}: is not one of the {self._world} processes that train together")
         self._mosaics = _training_mosaics(data_dir, config)
         self._noisy = _noisy_of(data_dir, self._mosaics) if config.noise == "stored" else {}
         self._profiles = [load_bayer_profile(name) for name in config.profiles]
@@ -265,6 +272,9 @@ def _noisy_of(
     return found
 
 
-def _world_size() -> int:
+def _place_among_processes() -> tuple[int, int]:
+    """(rank, world) of this process, as `torch.distributed` knows them."""
     distributed = torch.distributed
-    return distributed.get_world_size() if distributed.is_available() and distributed.is_initialized() else 1
+    if not (distributed.is_available() and distributed.is_initialized()):
+        return 0, 1
+    return distributed.get_rank(), distributed.get_world_size()
