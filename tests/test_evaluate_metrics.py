@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from skimage import data
 
+from fsid.errors import FsidError
 from fsid.evaluate import denoise_classical, psnr, ssim
 from fsid.evaluate.classical import _anscombe, _unbiased_inverse
 from fsid.sensor import NoiseLevel, add_noise, clean_from_photo, load_profile, variance
@@ -21,6 +22,21 @@ def test_psnr_of_a_known_error(rng: np.random.Generator):
 
 def test_values_outside_the_range_count_as_clipped():
     assert psnr(np.full((8, 8), -3.0), np.zeros((8, 8))) == float("inf")
+
+
+@pytest.mark.parametrize("metric", [psnr, ssim])
+def test_what_has_no_range_of_one_or_another_shape_is_refused(metric):
+    """Clipped to 0..1, two 8-bit pictures without black are both white, and equal."""
+    grey, light = (np.full((16, 16, 3), value, np.uint8) for value in (100, 200))
+    with pytest.raises(FsidError, match=r"uint8.*divide"):
+        metric(grey, light)
+    with pytest.raises(FsidError, match="cannot be compared"):
+        metric(grey / 255, light[:1] / 255)
+
+
+def test_ssim_of_less_than_its_window_is_refused():
+    with pytest.raises(FsidError, match="11x11"):
+        ssim(np.zeros((8, 8, 3)), np.zeros((8, 8, 3)))
 
 
 def test_ssim_is_one_for_equal_images_and_falls_with_noise(rng: np.random.Generator):

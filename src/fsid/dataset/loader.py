@@ -104,7 +104,9 @@ class PatchDataset(Dataset[Batch]):
         self._rank = own_rank if rank is None else rank
         self._world = all_ranks if world is None else world
         if not 0 <= self._rank < self._world:
-            raise FsidError(f"rank {self._rank}: is not one of the {self._world} processes that train together")
+            raise FsidError(
+                f"rank {self._rank}: is not one of the {self._world} processes that train together"
+            )
         self._mosaics = _training_mosaics(data_dir, config)
         self._noisy = _noisy_of(data_dir, self._mosaics) if config.noise == "stored" else {}
         self._profiles = [load_bayer_profile(name) for name in config.profiles]

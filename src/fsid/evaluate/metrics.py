@@ -10,15 +10,31 @@ from __future__ import annotations
 import numpy as np
 from skimage.metrics import structural_similarity
 
+from fsid.errors import FsidError
+
+_WINDOW_PX = 11
+
 
 def psnr(image: np.ndarray, truth: np.ndarray) -> float:
-    """Peak signal-to-noise ratio in dB of two arrays of equal shape, 0..1; inf where equal, NaN of NaN."""
+    """Peak signal-to-noise ratio in dB of two arrays of equal shape, 0..1; inf where equal, NaN of NaN.
+
+    FsidError for arrays of different shapes or of integers.
+    """
+    _check_alike(image, truth)
     error = np.mean(np.square(np.clip(image, 0, 1) - np.clip(truth, 0, 1), dtype=np.float64))
     return float(-10.0 * np.log10(error)) if error != 0 else float("inf")
 
 
 def ssim(image: np.ndarray, truth: np.ndarray) -> float:
-    """Structural similarity (Wang et al. 2004) of two (H, W, 3) images, range 0..1, mean over channels."""
+    """Structural similarity (Wang et al. 2004) of two (H, W, 3) images, range 0..1, mean over channels.
+
+    FsidError for images of different shapes, of integers, or of less than 11x11 pixels.
+    """
+    _check_alike(image, truth)
+    if image.ndim != 3 or min(image.shape[:2]) < _WINDOW_PX:
+        raise FsidError(
+            f"SSIM takes (H, W, 3) images of at least {_WINDOW_PX}x{_WINDOW_PX}, not {image.shape}"
+        )
     return float(
         structural_similarity(
             np.clip(image, 0, 1),
@@ -30,3 +46,13 @@ def ssim(image: np.ndarray, truth: np.ndarray) -> float:
             channel_axis=2,
         )
     )
+
+
+def _check_alike(image: np.ndarray, truth: np.ndarray) -> None:
+    """NumPy would stretch one shape to the other, and the clip to 0..1 makes white of all whole numbers."""
+    if image.shape != truth.shape:
+        raise FsidError(f"images of shapes {image.shape} and {truth.shape} cannot be compared")
+    if image.dtype.kind != "f" or truth.dtype.kind != "f":
+        raise FsidError(
+            f"images of {image.dtype} and {truth.dtype}: give values in 0..1; divide 8-bit ones by 255"
+        )
