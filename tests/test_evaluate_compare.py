@@ -20,7 +20,7 @@ from fsid.evaluate.compare import Row, confidence
 from fsid.evaluate.comparison_report import comparison_sections
 from fsid.evaluate.models import model_names
 from fsid.evaluate.report import METRICS, level_label, write_report
-from fsid.sensor import read_raw
+from fsid.sensor import Raw, read_raw
 
 
 @pytest.fixture(scope="module")
@@ -91,6 +91,23 @@ def test_the_truth_scores_perfectly(small_set: Path):
         (small_set / "testset.json").write_text(json.dumps(dataclasses.asdict(testset)))
     assert row.psnr_raw == float("inf")
     assert row.ssim == pytest.approx(1.0)
+
+
+def test_a_method_may_work_in_place(small_set: Path):
+    """And methods may come from a generator."""
+
+    def blackened(raw: Raw) -> Raw:
+        raw.mosaic[:] = 0
+        return raw
+
+    alone = compare(small_set, [NOISY]).rows
+    rows = compare(small_set, iter([Method("mine", "", blackened), NOISY])).rows
+    assert [row for row in rows if row.model == "noisy"] == list(alone)
+
+
+def test_nothing_to_compare_is_said(small_set: Path):
+    with pytest.raises(FsidError, match="no method"):
+        compare(small_set, [])
 
 
 def test_the_report_is_one_file_that_loads_nothing(small_set: Path, tmp_path: Path):

@@ -5,8 +5,8 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, astuple, dataclass, fields
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict, astuple, dataclass, fields, replace
 from itertools import product
 from pathlib import Path
 
@@ -24,7 +24,10 @@ from fsid.sensor import Raw, develop, read_raw, upright
 
 @dataclass(frozen=True)
 class Method:
-    """A denoiser under test. training: what it was trained on, in words ("" for the baselines)."""
+    """A denoiser under test. training: what it was trained on, in words ("" for the baselines).
+
+    denoise: may change what it is given, which is a copy.
+    """
 
     name: str
     training: str
@@ -86,7 +89,7 @@ CLASSICAL = Method("classical", "", denoise_classical)
 
 def compare(
     root: Path,
-    methods: Sequence[Method],
+    methods: Iterable[Method],
     *,
     crop_levels: Sequence[str] = (),
     crop_px: int = 128,
@@ -98,7 +101,10 @@ def compare(
     Rows cover each set, and all sets together where there is more than one.
     """
     testset = read_testset(root)
+    methods = tuple(methods)
     names = [method.name for method in methods]
+    if not names:
+        raise FsidError(f"{root}: there is no method to compare")
     if twice := [name for name in names if names.count(name) > 1]:
         raise FsidError(f"{twice[0]}: two models have this name")
     if unknown := set(crop_levels) - set(testset.levels):
@@ -113,7 +119,7 @@ def compare(
         frames = [_noisy(testset.noisy(root, image, level, n), truth) for n in range(testset.frames)]
         outputs, shown_psnr = {}, {}
         for method in methods:
-            results = [method.denoise(frame) for frame in frames]
+            results = [method.denoise(replace(frame, mosaic=frame.mosaic.copy())) for frame in frames]
             developed = [develop(result) for result in results]
             outputs[method.name] = developed[0]
             figures = [
