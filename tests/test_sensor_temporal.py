@@ -83,6 +83,45 @@ def test_another_exposure_is_refused(rng):
         burst([exposure(rng), exposure(rng, RAMP, 1.3)])
 
 
+@pytest.mark.parametrize(("shift", "gain"), [(48, 1.0), (0, 1.3)], ids=["moved", "brighter"])
+def test_a_burst_goes_on_without_a_frame_that_was_refused(rng, shift, gain):
+    """What the frame held must not count as motion, or as noise, of those that come after it."""
+    light = np.roll(RAMP, 48, axis=1)  # no edge at the border of the picture
+    frames = [exposure(rng, light) for _ in range(6)]
+    stats, undisturbed = burst(frames[:3]), burst(frames)
+    with pytest.raises(FsidError):
+        stats.add(exposure(rng, np.roll(light, shift, axis=1), gain))
+    for frame in frames[3:]:
+        stats.add(frame)
+    assert (stats.frames, stats.moved_share) == (6, 0)
+    for found, expected in zip(stats.sites(None), undisturbed.sites(None), strict=True):
+        np.testing.assert_array_equal(found, expected)
+
+
+@pytest.mark.parametrize(
+    "frame",
+    [
+        exposure(np.random.default_rng(0)) / WHITE,
+        exposure(np.random.default_rng(0)) - 2 * BLACK,
+        exposure(np.random.default_rng(0)) + 70_000,
+        np.where(RAMP > 1000, np.nan, 300.0),
+        exposure(np.random.default_rng(0))[..., None],
+    ],
+    ids=["normalised", "below 0", "beyond 16 bits", "NaN", "a channel axis"],
+)
+def test_what_is_no_dn_is_refused(frame):
+    """Stored as 16 bits, it would wrap around or lose its fractions, and give another noise."""
+    with pytest.raises(FsidError, match="own frame: holds"):
+        TemporalStatistics(WHITE).add(frame, "own frame")
+
+
+@pytest.mark.parametrize("kind", ["<u2", ">u2", "<f8"])
+def test_whole_numbers_of_any_type_are_dn(rng, kind):
+    frames = [exposure(rng) for _ in range(3)]
+    (expected,), (found,) = (burst(f.astype(k) for f in frames).sites(None) for k in ("<i8", kind))
+    np.testing.assert_array_equal(found, expected)
+
+
 def test_memory_does_not_depend_on_the_number_of_frames(rng):
     import tracemalloc
 

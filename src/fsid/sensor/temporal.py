@@ -21,6 +21,7 @@ import numpy as np
 
 from fsid.errors import FsidError
 from fsid.sensor.mosaic import site_offsets
+from fsid.sensor.quantise import MAX_DN
 
 SIGNIFICANT = 5.0  # standard errors: of 64 blocks in 1,000 frames none deviates so far by chance
 LARGEST_FLICKER = 0.1  # of the light; beyond it this is another exposure, and its noise another noise
@@ -66,25 +67,30 @@ class TemporalStatistics:
     def add(self, dn: np.ndarray, name: str = "a frame") -> None:
         """One more frame, (H, W) integers, of the same size as the others; `name` for messages.
 
-        FsidError: another size, the light changed by more than 10 %, or the scene moved.
+        FsidError: no integers of 16 bits, another size, the light changed by more than 10 %, or the scene
+        moved. A frame that is refused does not count; the burst may go on without it.
         """
+        _check_dn(dn, name)
         if self._first is None:
             self._start(dn)
         assert self._first is not None
         if dn.shape != self._first.shape:
             raise FsidError(f"{name} of the burst is {dn.shape}, the first one {self._first.shape} (H, W)")
-        self._whites += dn >= self._white_level
-        self._zeros += dn <= 0
+        white = dn >= self._white_level
         change = dn - self._first.astype(np.float64)
         if self.frames:
-            gain, offset = self._match(change, name)
+            whites = self._whites + white
+            gain, offset, moved = self._match(change, whites, name)
             if (gain, offset) != (1.0, 0.0):
                 change += self._first * (1 - gain) - offset
-            _check_white(np.where(self._whites, 0.0, np.sign(change)), name)
+            _check_white(np.where(whites, 0.0, np.sign(change)), name)
             if self._dark:
                 self._count_noise(change)
+            self._moved = moved
             self.gains.append(gain)
             self.offsets_dn.append(offset)
+        self._whites += white
+        self._zeros += dn <= 0
         self._sum += change
         change *= change
         self._squares += change
@@ -188,31 +194,28 @@ class TemporalStatistics:
         tiles = image[: height * rows, : width * columns].reshape(rows, height, columns, width)
         return reduce(tiles, axis=(1, 3))
 
-    def _match(self, change: np.ndarray, name: str) -> tuple[float, float]:
-        """(gain, offset) of a frame against the first one; (1, 0) where neither is significant."""
-        usable = ~self._moved & (self._blocks(self._whites > 0, np.mean) < _MAX_CLIPPED_SHARE)
+    def _match(self, change: np.ndarray, whites: np.ndarray, name: str) -> tuple[float, float, np.ndarray]:
+        """(gain, offset, moved blocks) of a frame against the first one; (1, 0) where neither is significant.
+
+        whites: how often each pixel was white, this frame included.
+        """
+        usable = ~self._moved & (self._blocks(whites > 0, np.mean) < _MAX_CLIPPED_SHARE)
         means, noise = self._blocks(change, np.mean), np.maximum(self._blocks(change, np.var), 1 / 12)
         if usable.sum() < _MIN_BLOCKS:
-            return 1.0, 0.0
+            return 1.0, 0.0, self._moved
         height, width = self._block
         error2 = noise * (1 / (height * width) + _BANDING / min(height, width))
         gain, offset = _gain_and_offset(means[usable], self._reference[usable], 1 / error2[usable])
         left2 = (means - (gain - 1) * self._reference - offset) ** 2
-        self._exclude(usable & (left2 > CONTAMINATION * noise / 2) & (left2 > SIGNIFICANT**2 * error2), name)
+        changed = usable & (left2 > CONTAMINATION * noise / 2) & (left2 > SIGNIFICANT**2 * error2)
+        moved = self._moved | changed
+        _check_still(moved, name)
         if abs(gain - 1) > LARGEST_FLICKER:
             raise FsidError(
                 f"{name}: its light differs by {100 * (gain - 1):+.0f} % from the first frame of the burst, "
                 f"or the scene moved; use steady light and a tripod, or leave it out"
             )
-        return gain, offset
-
-    def _exclude(self, moved: np.ndarray, name: str) -> None:
-        self._moved |= moved
-        if self._moved.mean() >= MOVED_SHARE:
-            raise FsidError(
-                f"{name}: the scene differs from the first frame's in {100 * self._moved.mean():.0f} % of "
-                f"the image; a burst must show a static scene from a tripod, in steady light"
-            )
+        return gain, offset, moved
 
     def _count_noise(self, change: np.ndarray) -> None:
         height, width = change.shape
@@ -225,11 +228,31 @@ class TemporalStatistics:
         self._noise += (pixel, fourth, rows.var() - pixel / width, columns.var() - pixel / height)
 
 
+def _check_dn(dn: np.ndarray, name: str) -> None:
+    """FsidError unless `dn` is (H, W) whole numbers that 16 bits hold, of whatever type."""
+    if dn.ndim != 2:
+        raise FsidError(f"{name}: holds an array of shape {dn.shape}, not a mosaic (height, width)")
+    whole = dn.dtype.kind in "ui" or (dn.dtype.kind == "f" and bool(np.all(dn == np.rint(dn))))
+    if not whole or not 0 <= dn.min(initial=0) <= dn.max(initial=0) <= MAX_DN:
+        raise FsidError(
+            f"{name}: holds {dn.dtype} values that are no DN, integers from 0 to {MAX_DN} as the camera "
+            "stores them, black level included"
+        )
+
+
+def _check_still(moved: np.ndarray, name: str) -> None:
+    if moved.mean() >= MOVED_SHARE:
+        raise FsidError(
+            f"{name}: the scene differs from the first frame's in {100 * moved.mean():.0f} % of "
+            f"the image; a burst must show a static scene from a tripod, in steady light"
+        )
+
+
 def _check_white(sign: np.ndarray, name: str) -> None:
     """FsidError where the sign of a pixel's change tells that of its next neighbour of the same colour.
 
     Noise is white, and banding is only along rows or columns; a picture that shifts is correlated both ways.
-    The sign, because one moving object, which `_exclude` deals with, must not decide for the whole picture.
+    The sign, because one moving object, which `_match` leaves out, must not decide for the whole picture.
     """
     across, down = sign[::_THINNING], sign[:, ::_THINNING].T
     count = min(across.size, down.size)
