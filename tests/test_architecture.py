@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -40,3 +41,34 @@ def test_pairs_need_no_pytorch():
         "sys.exit('torch' in sys.modules)"
     )
     subprocess.run([sys.executable, "-c", script], check=True)
+
+
+def test_packages_are_found_by_name():
+    """`fsid.sensor` must not depend on what was called before, and Jupyter completes what it is told of."""
+    script = (
+        "import sys, fsid; assert 'torch' not in sys.modules and 'numpy' not in sys.modules;"
+        "fsid.sensor.load_profile('pixel6'); fsid.render.Renderer; fsid.dataset.generate;"
+        "sys.exit(not {*fsid.__all__, 'sensor', 'evaluate'} <= set(dir(fsid)))"
+    )
+    subprocess.run([sys.executable, "-c", script], check=True)
+
+
+def test_types_are_seen_by_those_who_use_them(tmp_path: Path):
+    """`denoise` is a package and a function: a type checker must see the function."""
+    script = tmp_path / "script.py"
+    script.write_text("import fsid\nimport fsid.denoise\n\nfsid.denoise()\nfsid.load_model(2)\n", "utf-8")
+    seen = [PACKAGE / name for name in ("__init__.py", "denoise/__init__.py", "denoise/interface.py")]
+    options = ["--strict", "--follow-imports=skip", f"--cache-dir={tmp_path}", "--config-file="]
+    environment = {**os.environ, "MYPYPATH": str(PACKAGE.parent)}
+    done = subprocess.run(
+        [sys.executable, "-m", "mypy", *options, str(script), *map(str, seen)],
+        capture_output=True,
+        text=True,
+        env=environment,
+        check=False,
+    )
+    found = [line for line in done.stdout.splitlines() if line.startswith(str(script))]
+    assert len(found) == 2, done.stdout
+    assert 'Missing positional argument "raw" in call to "denoise"' in found[0]
+    assert 'Argument 1 to "load_model" has incompatible type "int"' in found[1]
+    assert (PACKAGE / "py.typed").is_file()

@@ -35,7 +35,7 @@ def test_every_file_of_the_package_is_in_the_wheel(wheel: Path):
     }
     with zipfile.ZipFile(wheel) as archive:
         assert expected <= set(archive.namelist())
-    assert {path.rpartition(".")[2] for path in expected} >= {"py", "glsl", "yaml", "j2"}
+    assert {path.rpartition(".")[2] for path in expected} >= {"py", "glsl", "yaml", "j2", "typed"}
 
 
 def test_the_wheel_alone_runs(wheel: Path, tmp_path: Path):

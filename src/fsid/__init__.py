@@ -5,7 +5,8 @@
     fsid.write_dng("clean.dng", clean)
 
 Data flows one way, and each step is a package: assets -> scene -> render -> sensor -> dataset ->
-denoise -> evaluate -> cli. See docs/architecture.md. Importing `fsid` loads none of them: these names do.
+denoise -> evaluate -> cli. See docs/architecture.md. Importing `fsid` loads none of them: these names do, and
+so does `fsid.sensor`.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from fsid.denoise import load_model
+    from fsid.denoise.interface import denoise
     from fsid.sensor import develop, read_raw, write_dng
 
 __version__ = "0.1.0"
@@ -27,10 +29,16 @@ _HOMES = {
     "write_dng": "fsid.sensor",
 }
 
+_PACKAGES = ("assets", "dataset", "denoise", "evaluate", "render", "scene", "sensor")
+
 
 def __getattr__(name: str) -> Any:
-    if name == "denoise":  # a package that can be called
-        return import_module("fsid.denoise")
+    if name in _PACKAGES:  # denoise is one that can be called
+        return import_module(f"fsid.{name}")
     if name in _HOMES:
         return getattr(import_module(_HOMES[name]), name)
     raise AttributeError(f"module 'fsid' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*__all__, *_PACKAGES, "__version__"})
