@@ -144,6 +144,15 @@ def test_the_default_is_the_papers_model():
     assert np.any(np.abs(unrounded * 959 - np.rint(unrounded * 959)) > 0.1)
 
 
+@pytest.mark.parametrize(
+    "terms", [{"row": 0.8, "column": 0.8}, {"tail": -1.0}, {"defective": 2.0}, {"prnu": np.nan}]
+)
+def test_terms_that_no_sensor_has_are_refused(terms):
+    """Noise of a share above 1 was NaN everywhere, and the profile that holds it could not be read again."""
+    with pytest.raises(FsidError, match=next(iter(terms))):
+        NoiseTerms(**terms)
+
+
 def test_switching_one_term_leaves_the_others_noise(tmp_path):
     plain, banded = stack(NoiseTerms(), 0.3, 1), stack(NoiseTerms(row=0.0001), 0.3, 1)
     assert np.max(np.abs(plain - banded)) < 1e-3

@@ -16,6 +16,7 @@ stream: switching one leaves the others' noise as it was.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -29,7 +30,10 @@ from fsid.sensor.raw import NoiseLevel, Raw
 
 @dataclass(frozen=True)
 class NoiseTerms:
-    """See the module docstring for meaning and units; 0 and False switch a term off."""
+    """See the module docstring for meaning and units; 0 and False switch a term off.
+
+    FsidError: a negative term, or shares (row + column, defective) of 1 and more.
+    """
 
     poisson: bool = False
     row: float = 0.0
@@ -41,6 +45,13 @@ class NoiseTerms:
     dark_current_e_s: float = 0.0
     defective: float = 0.0
     quantisation: bool = True
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            if not 0 <= getattr(self, field.name) < math.inf:
+                raise FsidError(f"{field.name}: {getattr(self, field.name)} is not a number >= 0")
+        if self.row + self.column >= 1 or self.defective >= 1:
+            raise FsidError("row + column and defective are shares and must stay below 1")
 
 
 PAPER = NoiseTerms()
@@ -97,10 +108,10 @@ def parse_terms(data: Any, where: str) -> NoiseTerms:
         switch = isinstance(known[key], bool)
         if isinstance(value, bool) != switch or not isinstance(value, int | float) or not 0 <= value < 1e6:
             raise FsidError(f"{where}.{key} must be {'true or false' if switch else 'a number >= 0'}")
-    terms = NoiseTerms(**data)
-    if terms.row + terms.column >= 1 or terms.defective >= 1:
-        raise FsidError(f"{where}: row + column and defective are shares and must stay below 1")
-    return terms
+    try:
+        return NoiseTerms(**data)
+    except FsidError as error:
+        raise FsidError(f"{where}: {error}") from None
 
 
 def _read(rng: np.random.Generator, shape: tuple[int, ...], tail: float) -> np.ndarray:
