@@ -9,8 +9,10 @@ from fsid.errors import FsidError
 from fsid.sensor import (
     CFA_PATTERNS,
     NoiseLevel,
+    NoiseTerms,
     Raw,
     add_noise,
+    add_noise_terms,
     clean_levels,
     from_dn,
     level_rand,
@@ -42,6 +44,42 @@ def test_variance_law_holds_at_every_site(cfa, x):
     np.testing.assert_allclose(sites.var(axis=1, ddof=1), expected, rtol=4.5 * np.sqrt(2 / n))
     assert np.all(np.abs(sites.mean(axis=1) - x) < 4.5 * np.sqrt(expected / n))
     assert noisy.noise == LEVEL
+
+
+@pytest.mark.parametrize(
+    "level",
+    [
+        NoiseLevel((0.001,) * 4, (-1e-5,) * 4),
+        NoiseLevel((np.nan,) * 4, (1e-5,) * 4),
+        NoiseLevel((0.001,) * 3, (1e-5,) * 3),
+    ],
+    ids=["negative", "NaN", "three sites"],
+)
+def test_a_level_that_is_none_is_refused(level):
+    """Negative variances made images of NaN, or counted as none."""
+    rng, clean = np.random.default_rng(0), _flat(0.2, side=8)
+    for use in (
+        lambda: add_noise(rng, clean, level),
+        lambda: noisy_from_clean(rng, clean, 800, level),
+        lambda: add_noise_terms(rng, clean, level, NoiseTerms(row=0.1)),
+        lambda: variance(clean.mosaic, level, clean.cfa),
+    ):
+        with pytest.raises(FsidError, match="NoiseLevel"):
+            use()
+
+
+def test_electrons_are_not_counted_without_shot_noise():
+    level = NoiseLevel((0.0,) * 4, (1e-5,) * 4)
+    with pytest.raises(FsidError, match="k = 0"):
+        add_noise_terms(np.random.default_rng(0), _flat(0.2, side=8), level, NoiseTerms(poisson=True))
+
+
+@pytest.mark.parametrize("shape", [(8, 8), (4, 8, 8), (7, 8)])
+def test_the_variance_is_of_one_shape_with_the_image(shape):
+    """A mosaic without its pattern was stretched to four images, one per site."""
+    cfa = None if shape == (8, 8) else "RGGB"
+    with pytest.raises(FsidError, match="shape"):
+        variance(np.zeros(shape, np.float32), LEVEL, cfa)
 
 
 def test_noise_is_white_and_gaussian():

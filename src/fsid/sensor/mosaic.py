@@ -45,7 +45,7 @@ def shift_cfa(cfa: str, rows: int, columns: int) -> str:
 
 def mosaic(rgb: Any, cfa: str) -> Any:
     """Keep of each pixel of `rgb` (H, W, 3), H and W even, the one channel its filter passes: (H, W)."""
-    _check_even(rgb.shape[:2])
+    check_even(rgb.shape[:2])
     out = namespace(rgb).empty_like(rgb[..., 0])
     for (r, c), channel in zip(site_offsets(cfa), SITE_CHANNEL, strict=True):
         out[r::2, c::2] = rgb[r::2, c::2, channel]
@@ -54,7 +54,7 @@ def mosaic(rgb: Any, cfa: str) -> Any:
 
 def pack(mosaic: Any, cfa: str) -> Any:
     """Mosaic (H, W), H and W even, to its four sites (4, H/2, W/2) in the order R, Gr, Gb, B."""
-    _check_even(mosaic.shape)
+    check_even(mosaic.shape)
     return namespace(mosaic).stack([mosaic[r::2, c::2] for r, c in site_offsets(cfa)])
 
 
@@ -75,7 +75,7 @@ def bayer_crop(raw: Raw, top: int, left: int, height: int, width: int) -> Raw:
     `bayer_crop(raw, 0, 1, h, w - 2)` of RGGB is GRBG. height and width even, inside the image.
     """
     rows, columns = raw.mosaic.shape
-    _check_even((height, width))
+    check_even((height, width))
     if top < 0 or left < 0 or top + height > rows or left + width > columns:
         raise FsidError(f"crop {width}x{height} at ({left}, {top}) lies outside the {columns}x{rows} image")
     cut = np.ascontiguousarray(raw.mosaic[top : top + height, left : left + width])
@@ -97,6 +97,7 @@ def bayer_flip(raw: Raw, vertical: bool, horizontal: bool) -> Raw:
     )
 
 
-def _check_even(shape: tuple[int, ...]) -> None:
+def check_even(shape: tuple[int, ...]) -> None:
+    """FsidError unless `shape` is (H, W) of whole 2x2 tiles."""
     if len(shape) != 2 or shape[0] % 2 or shape[1] % 2 or 0 in shape:
         raise FsidError(f"a Bayer image has an even height and width; got shape {shape}: crop it first")

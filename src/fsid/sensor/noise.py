@@ -19,7 +19,7 @@ import numpy as np
 from fsid.errors import FsidError
 from fsid.sensor.formula import noise_variance, with_noise
 from fsid.sensor.gaussian import standard_normal
-from fsid.sensor.mosaic import site_offsets
+from fsid.sensor.mosaic import check_even, site_offsets
 from fsid.sensor.profiles import CameraProfile
 from fsid.sensor.quantise import ROUNDING_DN2
 from fsid.sensor.raw import NoiseLevel, Raw
@@ -32,11 +32,16 @@ SIGMA2_JITTER = 0.2  # relative sigma: read noise varies more, with temperature 
 def variance(x: np.ndarray, level: NoiseLevel, cfa: str | None = None) -> np.ndarray:
     """Noise variance `k max(x, 0) + sigma2` of the clean signal x, normalised units, same shape, float32.
 
-    x is packed (4, h, w) in the order R, Gr, Gb, B, or a mosaic (H, W) together with its `cfa`.
+    x is packed (4, h, w) in the order R, Gr, Gb, B, or a mosaic (H, W) together with its `cfa`. FsidError
+    for anything else.
     """
+    level.check()
     x = np.asarray(x, np.float32)
     if cfa is None:
+        if x.ndim != 3 or x.shape[0] != 4:
+            raise FsidError(f"an image of shape {x.shape} without cfa: give (4, h, w), or (H, W) and its cfa")
         return noise_variance(x, *(np.array(v, np.float32)[:, None, None] for v in (level.k, level.sigma2)))
+    check_even(x.shape)
     tiles = x.reshape(-1, 2, x.shape[1])
     return noise_variance(tiles, *_rows(level, cfa, x.shape[1])).reshape(x.shape)
 
@@ -44,8 +49,11 @@ def variance(x: np.ndarray, level: NoiseLevel, cfa: str | None = None) -> np.nda
 def add_noise(rng: np.random.Generator, raw: Raw, level: NoiseLevel) -> Raw:
     """One exposure of the clean `raw`: its mosaic plus noise of `level`, which the result carries.
 
-    Values may fall below 0 and above 1; `quantise` stores them as the camera would.
+    Values may fall below 0 and above 1; `quantise` stores them as the camera would. FsidError for an odd
+    height or width, and a level that is none.
     """
+    level.check()
+    check_even(raw.mosaic.shape)
     height, width = raw.mosaic.shape
     rows = _rows(level, raw.cfa, width)
     noisy = np.empty((height // 2, 2, width), np.float32)
@@ -59,6 +67,7 @@ def add_noise(rng: np.random.Generator, raw: Raw, level: NoiseLevel) -> Raw:
 
 def before_converter(level: NoiseLevel, span: float) -> NoiseLevel:
     """`level` of stored data without the rounding to 1 / span, span = white - black in DN; sigma2 >= 0."""
+    level.check()
     rounding = ROUNDING_DN2 / span**2
     r, gr, gb, b = (max(value - rounding, 0.0) for value in level.sigma2)
     return NoiseLevel(k=level.k, sigma2=(r, gr, gb, b))

@@ -8,10 +8,12 @@ the network would learn the bias. Var(x) is that of stored data: rounding is a p
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from fsid.errors import FsidError
 from fsid.sensor.metadata import Metadata
 
 CFA_PATTERNS = ("RGGB", "BGGR", "GRBG", "GBRG")
@@ -26,6 +28,13 @@ class NoiseLevel:
 
     k: tuple[float, float, float, float]
     sigma2: tuple[float, float, float, float]
+
+    def check(self) -> None:
+        """FsidError unless these are variances of four sites, as a file or a caller may not give them."""
+        if len(self.k) != 4 or len(self.sigma2) != 4:
+            raise FsidError(f"{self}: needs four values each, for the sites R, Gr, Gb, B")
+        if not all(0 <= value < math.inf for value in (*self.k, *self.sigma2)):
+            raise FsidError(f"{self}: k and sigma2 are variances, finite and not negative")
 
 
 @dataclass(frozen=True)

@@ -68,8 +68,12 @@ def add_noise_terms(
 ) -> Raw:
     """One exposure of the clean `raw` at `level` with `terms`, neither rounded nor clipped.
 
-    unit: which specimen of the camera; its fixed patterns. exposure_s: for the dark current.
+    unit: which specimen of the camera; its fixed patterns. exposure_s: for the dark current. FsidError for
+    a level that is none, and counts of electrons with k = 0, which says that they are infinitely many.
     """
+    level.check()
+    if terms.poisson and min(level.k) == 0:
+        raise FsidError(f"poisson: {level} has a site without shot noise, k = 0; switch the term off")
     shot, pixels, rows, columns, level_drift = rng.spawn(5)
     shape = raw.mosaic.shape
     k, sigma2 = _site_map(level.k, raw.cfa, shape), _site_map(level.sigma2, raw.cfa, shape)
