@@ -88,3 +88,18 @@ def test_flip_keeps_gr_apart_from_gb(cfa, vertical, horizontal):
 def test_bad_shapes_and_patterns_are_named(call, words):
     with pytest.raises(FsidError, match=words):
         call()
+
+
+@pytest.mark.parametrize(
+    ("image", "words"),
+    [
+        (np.full((8, 8), 500, np.uint16), "uint16"),
+        (np.zeros((7, 8), np.float32), r"\(7, 8\)"),
+        (np.zeros((4, 8, 8), np.float32), r"\(4, 8, 8\)"),
+    ],
+    ids=["DN", "odd", "packed"],
+)
+def test_a_raw_holds_whole_tiles_of_normalised_values(image, words):
+    """DN for x were developed, and stored, as a white picture."""
+    with pytest.raises(FsidError, match=words):
+        _raw(image, "RGGB")

@@ -47,6 +47,7 @@ class Raw:
     (the inverse of DNG `AsShotNeutral`).
     xyz_to_camera: (3, 3) DNG `ColorMatrix1` for D65, rows R, G, B.
     iso: 0 where unknown. noise: None where unknown. metadata: of the file it was read from.
+    FsidError for a mosaic of another shape, or of integers: `from_dn` makes x of DN.
     """
 
     mosaic: np.ndarray
@@ -59,3 +60,10 @@ class Raw:
     iso: float = 0.0
     noise: NoiseLevel | None = None
     metadata: Metadata = Metadata()  # noqa: RUF009  frozen
+
+    def __post_init__(self) -> None:
+        shape = self.mosaic.shape
+        if len(shape) != 2 or shape[0] % 2 or shape[1] % 2 or 0 in shape:
+            raise FsidError(f"a Bayer image has an even height and width; got shape {shape}: crop it first")
+        if isinstance(self.mosaic, np.ndarray) and self.mosaic.dtype.kind != "f":
+            raise FsidError(f"the mosaic holds {self.mosaic.dtype}; give x = (DN - black) / (white - black)")
