@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from fsid.config import Override, from_plain, given_keys, load_settings, save_settings
@@ -43,6 +44,13 @@ def test_saved_settings_load_back(tmp_path: Path):
     settings = Outer(count=7, inner=Inner(0.5, ("q",)))
     save_settings(settings, tmp_path / "c.yaml")
     assert load_settings(Outer, tmp_path / "c.yaml") == settings
+
+
+def test_settings_made_in_python_are_saved(tmp_path: Path):
+    """With NumPy's numbers, paths for texts and lists for tuples, which YAML has no words for."""
+    settings = Outer(np.int64(7), np.bool_(True), [np.float32(0.5), 2.0], Inner(0.5, (Path("a/q"),)))
+    save_settings(settings, tmp_path / "c.yaml")
+    assert load_settings(Outer, tmp_path / "c.yaml") == Outer(7, True, (0.5, 2.0), Inner(0.5, ("a/q",)))
 
 
 @pytest.mark.parametrize(

@@ -252,6 +252,13 @@ def test_the_corrected_command_goes_into_the_folder_of_the_one_that_failed(
         train(data, run, wrong, quiet=True)
 
 
+def test_settings_made_in_python_go_on(data: Path, tmp_path: Path) -> None:
+    """A list of profiles is read back as a tuple, which is no other training."""
+    config = replace(CONFIG, steps=np.int64(1), profiles=["pixel6"])
+    train(data, tmp_path / "run", config, quiet=True)
+    train(data, tmp_path / "run", config, quiet=True)
+
+
 @pytest.mark.parametrize("has_settings", [True, False])
 def test_a_run_stays_with_its_dataset(has_settings: bool, tmp_path: Path) -> None:
     def dataset(name: str, seed: int, shards: int = 1) -> Path:

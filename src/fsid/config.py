@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, TypeVar, get_args, get_origin
 
 import cattrs
+import numpy as np
 import yaml
 
 from fsid.errors import FsidError
@@ -71,7 +72,7 @@ for _kind, _hook in ((int, _strict_int), (float, _strict_float), (bool, _strict_
 
 
 def to_plain(settings: Any) -> Any:
-    """Dataclasses and tuples as dicts and lists: what YAML and JSON hold."""
+    """Dataclasses and tuples as dicts and lists, NumPy's numbers and paths as what YAML and JSON hold."""
     plain = _CONVERTER.unstructure(settings)
 
     def listed(value: Any) -> Any:
@@ -79,7 +80,9 @@ def to_plain(settings: Any) -> Any:
             return {key: listed(item) for key, item in value.items()}
         if isinstance(value, tuple | list):
             return [listed(item) for item in value]
-        return value
+        if isinstance(value, np.generic):
+            return value.item()
+        return str(value) if isinstance(value, Path) else value
 
     return listed(plain)
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from contextlib import nullcontext
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -233,7 +233,7 @@ def _prepare_run(data_dir: Path, run_dir: Path, config: TrainConfig, initial: De
     file = run_dir / CONFIG_FILE
     there = load_settings(TrainConfig, file) if file.is_file() else None
     if there is not None and has_network(run_dir):
-        old, new = asdict(there), asdict(config)
+        old, new = to_plain(there), to_plain(config)
         if changed := [key for key in new if new[key] != old[key]]:
             raise FsidError(
                 f"{file}: this run was started with another {', '.join(changed)}; "
