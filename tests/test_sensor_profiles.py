@@ -10,7 +10,7 @@ import pytest
 
 from fsid.cli.iso_notes import note_extrapolation
 from fsid.errors import FsidError
-from fsid.sensor import far_extrapolated, load_profile, profile_names
+from fsid.sensor import far_extrapolated, load_profile, profile_names, save_profile
 from fsid.sensor.iso_law import k_law, sigma2_law
 
 PUBLISHED = {
@@ -223,6 +223,14 @@ def test_read_noise_that_is_negative_everywhere_is_refused(tmp_path, value, is_r
     )
     with pytest.raises(FsidError, match=r"mine\.yaml: levels: .*sigma2") if is_refused else nullcontext():
         load_profile(path)
+
+
+def test_a_profile_of_numpy_numbers_is_saved(tmp_path):
+    known = load_profile("pixel6")
+    own = replace(known, iso=np.array(known.iso), black_level=np.int64(64), bits=np.uint8(10))
+    save_profile(tmp_path / "own.yaml", own)
+    save_profile(tmp_path / "known.yaml", known)
+    assert (tmp_path / "own.yaml").read_text() == (tmp_path / "known.yaml").read_text()
 
 
 def test_an_unknown_name_lists_the_known_ones():

@@ -24,7 +24,7 @@ import numpy as np
 import yaml
 from numpy.polynomial.polynomial import polyval
 
-from fsid.config import parse_yaml
+from fsid.config import parse_yaml, to_plain
 from fsid.errors import FsidError
 from fsid.files import write_atomically
 from fsid.sensor.camera_profile import MONO, CameraProfile, Measurement, Optics
@@ -94,7 +94,7 @@ def profile_file(profile: CameraProfile) -> bytes:
     if profile.measured is not None and len(profile.iso) > 1:
         data["law"] = _law(profile)
     data["levels"] = [_level(profile, row) for row in range(len(profile.iso))]
-    return yaml.safe_dump(data, sort_keys=False, default_flow_style=None, width=110).encode()
+    return yaml.safe_dump(to_plain(data), sort_keys=False, default_flow_style=None, width=110).encode()
 
 
 def _switched_on(terms: NoiseTerms) -> dict[str, Any]:
