@@ -15,7 +15,17 @@ import rawpy
 
 from fsid.cli.main import main
 from fsid.errors import FsidError
-from fsid.evaluate import CLASSICAL, NOISY, Method, compare, photo_testset, psnr, read_testset, write_results
+from fsid.evaluate import (
+    CLASSICAL,
+    NOISY,
+    Method,
+    compare,
+    photo_testset,
+    psnr,
+    read_testset,
+    simulated_testset,
+    write_results,
+)
 from fsid.evaluate.compare import Row, confidence
 from fsid.evaluate.comparison_report import comparison_sections
 from fsid.evaluate.models import model_names
@@ -296,6 +306,23 @@ def test_the_current_folder_is_no_name_for_a_test_set(photos: Path, tmp_path: Pa
     monkeypatch.chdir(tmp_path)
     with pytest.raises(FsidError, match="name a new folder"):
         photo_testset([photos], Path(), camera="pixel6", isos=[800])
+
+
+def test_levels_may_be_an_array_or_made_one_by_one(photos: Path, tmp_path: Path):
+    isos = np.array([800, 3200])
+    for name, given in (("array", isos), ("floats", isos * 1.0), ("generator", (int(iso) for iso in isos))):
+        testset = photo_testset(iter([photos]), tmp_path / name, camera="pixel6", isos=given)
+        assert testset.levels == ("iso800", "iso3200")
+    drawn = simulated_testset(
+        tmp_path / "drawn",
+        camera="pixel6",
+        luxes=np.array([1.0, 5.0]),
+        materials=iter(["text"]),
+        scenes=1,
+        width=64,
+        height=64,
+    )
+    assert drawn.levels == ("1lux", "5lux")
 
 
 def test_an_existing_folder_is_not_overwritten(photos: Path, tmp_path: Path):

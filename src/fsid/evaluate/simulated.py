@@ -9,7 +9,7 @@ of the camera.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -28,13 +28,13 @@ def simulated_testset(
     out: Path,
     *,
     camera: str,
-    luxes: Sequence[float] = (),
-    isos: Sequence[int] = (),
+    luxes: Iterable[float] = (),
+    isos: Iterable[float] = (),
     frames: int = 1,
     scenes: int = 3,
     width: int = 1024,
     height: int = 768,
-    materials: Sequence[str] = (),
+    materials: Iterable[str] = (),
     seed: int = 0,
     progress: Progress = lambda done, total: None,
 ) -> TestSet:
@@ -43,8 +43,9 @@ def simulated_testset(
     luxes and isos: the levels, LUXES where neither is given. materials: of MATERIALS, all where none is.
     """
     profile = load_bayer_profile(camera)
+    isos, luxes = tuple(isos), tuple(luxes)
     levels = levels_of(profile, isos, luxes or (() if isos else LUXES))
-    materials = materials or tuple(MATERIALS)
+    materials = tuple(materials) or tuple(MATERIALS)
     if unknown := set(materials) - set(MATERIALS):
         raise FsidError(f"{sorted(unknown)[0]}: no such material; choose from {', '.join(MATERIALS)}")
     if not (1 <= frames <= 100 and scenes >= 1):

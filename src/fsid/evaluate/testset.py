@@ -14,7 +14,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import product
@@ -119,12 +119,12 @@ def read_testset(root: Path) -> TestSet:
 
 
 def photo_testset(
-    folders: Sequence[Path],
+    folders: Iterable[Path],
     out: Path,
     *,
     camera: str,
-    isos: Sequence[int],
-    luxes: Sequence[float] = (),
+    isos: Iterable[float],
+    luxes: Iterable[float] = (),
     seed: int = 0,
     progress: Progress = lambda done, total: None,
 ) -> TestSet:
@@ -137,6 +137,7 @@ def photo_testset(
     """
     profile = load_bayer_profile(camera)
     levels = levels_of(profile, isos, luxes)
+    folders = tuple(folders)
     names = [folder.resolve().name for folder in folders]
     if twice := [name for name in names if names.count(name) > 1]:
         raise FsidError(f"{twice[0]}: two folders have this name, and it is that of a set; rename one")
@@ -173,11 +174,12 @@ class Setting(NamedTuple):
     exposure_s: float
 
 
-def levels_of(profile: CameraProfile, isos: Sequence[int], luxes: Sequence[float]) -> dict[str, Setting]:
+def levels_of(profile: CameraProfile, isos: Iterable[float], luxes: Iterable[float]) -> dict[str, Setting]:
     """The camera's setting at every level by name; FsidError where there is none or one is not positive."""
+    isos, luxes = tuple(isos), tuple(luxes)
     if not (isos or luxes) or not all(0 < level < np.inf for level in (*isos, *luxes)):
         raise FsidError("--iso: at least one positive ISO (or --lux) is needed, and no infinite one")
-    levels = {f"iso{iso}": Setting(float(iso), 0.0) for iso in isos}
+    levels = {f"iso{int(iso) if iso == int(iso) else iso}": Setting(float(iso), 0.0) for iso in isos}
     for lux in luxes:
         light = light_level(profile, lux, highest_iso=np.inf)
         levels[f"{lux:g}lux"] = Setting(light.iso, light.exposure_s)
