@@ -54,12 +54,13 @@ class StoredMosaic:
     split: str = "train"
 
 
-def index_mosaics(data_dir: Path, kind: MosaicKind = "clean") -> tuple[StoredMosaic, ...]:
+def index_mosaics(data_dir: str | Path, kind: MosaicKind = "clean") -> tuple[StoredMosaic, ...]:
     """All mosaics of one kind in `data_dir`/shard-*.tar, in the order of shards and samples.
 
     Raises FsidError where there is no shard, no sample, or a shard or DNG that is not readable as described
     above.
     """
+    data_dir = Path(data_dir)
     origin = _origin(data_dir)
     found = tuple(
         replace(mosaic, scene=scene, split=split)

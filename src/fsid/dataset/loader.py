@@ -92,12 +92,13 @@ class PatchDataset(Dataset[Batch]):
 
     def __init__(
         self,
-        data_dir: Path,
+        data_dir: str | Path,
         config: PatchConfig,
         seed: int,
         rank: int | None = None,
         world: int | None = None,
     ) -> None:
+        data_dir = Path(data_dir)
         if not config.profiles:
             raise FsidError("profiles: name at least one camera profile to draw noise from")
         own_rank, all_ranks = _place_among_processes()

@@ -14,8 +14,9 @@ from fsid.sensor import upright
 PHOTO_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".bmp")
 
 
-def find_photos(folder: Path) -> list[Path]:
+def find_photos(folder: str | Path) -> list[Path]:
     """The photographs directly inside `folder`, sorted by name; FsidError where there is none."""
+    folder = Path(folder)
     if not folder.is_dir():
         raise FsidError(f"{folder}: is not a folder of photographs")
     photos = files_inside(folder, PHOTO_SUFFIXES)
@@ -30,7 +31,7 @@ def files_inside(folder: Path, suffixes: tuple[str, ...]) -> list[Path]:
     return sorted(path for path in files if path.suffix.lower() in suffixes)
 
 
-def read_photo(path: Path) -> np.ndarray:
+def read_photo(path: str | Path) -> np.ndarray:
     """(H, W, 3) float32 sRGB-encoded 0..1, upright, cropped to even size; FsidError where unreadable."""
     pixels = _read(path)
     height, width = (size // 2 * 2 for size in pixels.shape[:2])

@@ -20,8 +20,9 @@ from fsid.sensor import develop
 GAP_PX = 4
 
 
-def save_png(path: Path, srgb: np.ndarray) -> None:
+def save_png(path: str | Path, srgb: np.ndarray) -> None:
     """Write a (H, W, 3) sRGB image, 0..1 float or uint8, as PNG; FsidError where it cannot be written."""
+    path = Path(path)
     check_png(path)
     pixels = srgb if srgb.dtype == np.uint8 else to_uint8(srgb)
     buffer = io.BytesIO()

@@ -20,9 +20,9 @@ from typing import Any
 from fsid.errors import FsidError
 
 
-def shard_path(folder: Path, number: int) -> Path:
+def shard_path(folder: str | Path, number: int) -> Path:
     """Path of shard `number`."""
-    return folder / f"shard-{number:05d}.tar"
+    return Path(folder) / f"shard-{number:05d}.tar"
 
 
 def part_path(path: Path) -> Path:
@@ -37,8 +37,9 @@ def remove_parts(folder: Path) -> None:
             part.unlink(missing_ok=True)
 
 
-def find_shards(folder: Path) -> list[Path]:
+def find_shards(folder: str | Path) -> list[Path]:
     """The finished shards of a dataset, in order; FsidError where there is none."""
+    folder = Path(folder)
     if not folder.is_dir():
         raise FsidError(f"{folder}: is not a dataset folder (fsid generate makes one)")
     shards = sorted(folder.glob("shard-*.tar"))
@@ -47,8 +48,9 @@ def find_shards(folder: Path) -> list[Path]:
     return shards
 
 
-def write_shard(path: Path, samples: Iterable[tuple[str, Mapping[str, bytes]]]) -> None:
+def write_shard(path: str | Path, samples: Iterable[tuple[str, Mapping[str, bytes]]]) -> None:
     """Write (key, {extension: bytes}) samples as one tar, atomically. FsidError where the disk refuses."""
+    path = Path(path)
     part = part_path(path)
     with _disk_refusals(path):
         try:
@@ -70,12 +72,12 @@ def write_shard(path: Path, samples: Iterable[tuple[str, Mapping[str, bytes]]]) 
             part.unlink(missing_ok=True)
 
 
-def shard_keys(path: Path) -> list[str]:
+def shard_keys(path: str | Path) -> list[str]:
     """The keys of the samples inside a shard, in order. FsidError where it is not a readable tar."""
     return list(dict.fromkeys(name.partition(".")[0] for name in _members(path)))
 
 
-def read_member(path: Path, name: str) -> bytes:
+def read_member(path: str | Path, name: str) -> bytes:
     """One file of a shard, for example `00000000.json`."""
     try:
         with tarfile.open(path, "r:") as tar:
@@ -124,7 +126,7 @@ def _read(path: Path, wanted: Callable[[str], bool]) -> Iterator[tuple[str, byte
         raise FsidError(f"{path}: is not a readable shard ({error}); delete it and generate again") from None
 
 
-def _members(path: Path) -> list[str]:
+def _members(path: str | Path) -> list[str]:
     try:
         with tarfile.open(path, "r:") as tar:
             return tar.getnames()

@@ -98,13 +98,16 @@ class Denoiser:
 
 
 def save_model(
-    path: Path, weights: Mapping[str, Tensor], card: ModelCard, circumstances: Mapping[str, Any] | None = None
+    path: str | Path,
+    weights: Mapping[str, Tensor],
+    card: ModelCard,
+    circumstances: Mapping[str, Any] | None = None,
 ) -> None:
     """Write `path` (.safetensors) and the card beside it (.json), each atomically.
 
     circumstances: for the readable copy alone, for example when and on what the network was trained.
     """
-    plain = to_plain(card)
+    path, plain = Path(path), to_plain(card)
     write_tensors(path, weights, {_CARD: json.dumps(plain, indent=1)})
     readable = json.dumps(plain | dict(circumstances or {}), indent=1)
     write_atomically(path.with_suffix(".json"), readable.encode())

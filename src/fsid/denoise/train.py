@@ -51,8 +51,8 @@ SELECTED = "psnr_scenes"  # which validation chooses the best network
 
 
 def train(
-    data_dir: Path,
-    run_dir: Path,
+    data_dir: str | Path,
+    run_dir: str | Path,
     config: TrainConfig,
     *,
     resume: bool = False,
@@ -69,6 +69,7 @@ def train(
     unusable data or settings, another run in `run_dir`, another process at work there, or a training that
     diverges.
     """
+    data_dir, run_dir = Path(data_dir), Path(run_dir)
     if config.threads:
         torch.set_num_threads(config.threads)
     gpu = torch.cuda.is_available()
@@ -194,9 +195,9 @@ def _card(data_dir: Path, config: TrainConfig, images: int, initial: Denoiser | 
     return ModelCard(config.network, config.patch_px, training, details)
 
 
-def load_history(run_dir: Path) -> tuple[list[int], list[float], list[float]]:
+def load_history(run_dir: str | Path) -> tuple[list[int], list[float], list[float]]:
     """Steps, losses and PSNRs (dB) of a run's training batches, means over `log_every` steps each."""
-    path = run_dir / HISTORY_FILE
+    path = Path(run_dir) / HISTORY_FILE
     try:
         rows = json.loads(path.read_text(encoding="utf-8"))
         return [row["step"] for row in rows], [row["loss"] for row in rows], [row["psnr"] for row in rows]

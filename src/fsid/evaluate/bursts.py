@@ -74,10 +74,10 @@ class _Placed:
 
 
 def burst_testset(
-    captures: Path,
-    out: Path,
+    captures: str | Path,
+    out: str | Path,
     *,
-    camera: str = "",
+    camera: str | Path = "",
     frames: int = 1,
     progress: Progress = lambda done, total: None,
 ) -> tuple[TestSet, list[TruthQuality]]:
@@ -88,6 +88,7 @@ def burst_testset(
     """
     if frames < 1:
         raise FsidError(f"--frames {frames}: at least one noisy frame per burst is needed")
+    captures, out = Path(captures), Path(out)
     bursts = _find_bursts(captures, frames)
     scenes = tuple(dict.fromkeys(scene for scene, _ in bursts))
     levels = tuple(sorted({level for _, level in bursts}, key=_level_order))
@@ -278,7 +279,7 @@ def _spread_over_site(variance: np.ndarray, cfa: str) -> np.ndarray:
     return np.maximum(out, 0)
 
 
-def _noise(raw: Raw, camera: str) -> NoiseLevel:
+def _noise(raw: Raw, camera: str | Path) -> NoiseLevel:
     if camera:
         return load_profile(camera).level(raw.iso)
     if raw.noise is not None:

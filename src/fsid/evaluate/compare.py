@@ -88,7 +88,7 @@ CLASSICAL = Method("classical", "", denoise_classical)
 
 
 def compare(
-    root: Path,
+    root: str | Path,
     methods: Iterable[Method],
     *,
     crop_levels: Sequence[str] = (),
@@ -100,6 +100,7 @@ def compare(
     crop_levels: levels of which a window of every image is kept; crop_px: its edge in pixels.
     Rows cover each set, and all sets together where there is more than one.
     """
+    root = Path(root)
     testset = read_testset(root)
     methods = tuple(methods)
     names = [method.name for method in methods]
@@ -158,7 +159,7 @@ def detailed_window(srgb: np.ndarray, size_px: int) -> tuple[tuple[slice, slice]
     return best, float(detail[best].mean())
 
 
-def write_results(rows: Sequence[Row], file: Path) -> None:
+def write_results(rows: Sequence[Row], file: str | Path) -> None:
     """Write results.json: a list of rows, figures rounded to 1e-4; null for the PSNR of equal images."""
 
     def plain(value: object) -> object:
@@ -167,7 +168,7 @@ def write_results(rows: Sequence[Row], file: Path) -> None:
         return round(value, 4) if np.isfinite(value) else None
 
     plain_rows = [{key: plain(value) for key, value in asdict(row).items()} for row in rows]
-    write_atomically(file, (json.dumps(plain_rows, indent=1, allow_nan=False) + "\n").encode())
+    write_atomically(Path(file), (json.dumps(plain_rows, indent=1, allow_nan=False) + "\n").encode())
 
 
 def write_images(images: Sequence[ImageRow], file: Path) -> None:

@@ -25,9 +25,9 @@ LUXES = (0.5, 1.0, 2.0, 5.0)
 
 
 def simulated_testset(
-    out: Path,
+    out: str | Path,
     *,
-    camera: str,
+    camera: str | Path,
     luxes: Iterable[float] = (),
     isos: Iterable[float] = (),
     frames: int = 1,
@@ -65,5 +65,5 @@ def simulated_testset(
         light = simulate(rng, testset.images[i].set, height, width)
         return clean_from_linear(rng, light * np.float32(KEY / GREY), profile)
 
-    capture(testset, out, profile, levels, truth, progress)
+    capture(testset, Path(out), profile, levels, truth, progress)
     return testset

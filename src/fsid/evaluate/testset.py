@@ -97,8 +97,9 @@ class TestSet:
             yield self.noisy(root, image, level, frame)
 
 
-def read_testset(root: Path) -> TestSet:
+def read_testset(root: str | Path) -> TestSet:
     """The description of the test set in `root`; FsidError where it is missing or broken."""
+    root = Path(root)
     file = root / "testset.json"
     try:
         plain = json.loads(file.read_text(encoding="utf-8"))
@@ -119,10 +120,10 @@ def read_testset(root: Path) -> TestSet:
 
 
 def photo_testset(
-    folders: Iterable[Path],
-    out: Path,
+    folders: Iterable[str | Path],
+    out: str | Path,
     *,
-    camera: str,
+    camera: str | Path,
     isos: Iterable[float],
     luxes: Iterable[float] = (),
     seed: int = 0,
@@ -137,12 +138,12 @@ def photo_testset(
     """
     profile = load_bayer_profile(camera)
     levels = levels_of(profile, isos, luxes)
-    folders = tuple(folders)
-    names = [folder.resolve().name for folder in folders]
+    sources = [Path(folder) for folder in folders]
+    names = [folder.resolve().name for folder in sources]
     if twice := [name for name in names if names.count(name) > 1]:
         raise FsidError(f"{twice[0]}: two folders have this name, and it is that of a set; rename one")
     photos = [
-        (name, path) for name, folder in zip(names, folders, strict=True) for path in find_photos(folder)
+        (name, path) for name, folder in zip(names, sources, strict=True) for path in find_photos(folder)
     ]
     testset = TestSet(
         camera=profile.name,
@@ -158,7 +159,7 @@ def photo_testset(
     def truth(rng: np.random.Generator, i: int) -> Raw:
         return clean_from_photo(rng, read_photo(photos[i][1]), profile)
 
-    capture(testset, out, profile, levels, truth, progress)
+    capture(testset, Path(out), profile, levels, truth, progress)
     return testset
 
 

@@ -10,7 +10,7 @@ light to the noise. What was found and left out on the way is said in `Calibrati
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -47,10 +47,10 @@ class Calibration:
 
 
 def calibrate(
-    paths: Sequence[Path],
+    paths: Iterable[str | Path],
     *,
     name: str,
-    dark: Sequence[Path] = (),
+    dark: Iterable[str | Path] = (),
     layout: Layout = Layout(),
     camera: str | None = None,
     tie_greens: bool = False,
@@ -64,7 +64,7 @@ def calibrate(
     FsidError: mixed cameras, lone frames, moving scene, saturated or too few frames, dark frames that are
     not dark.
     """
-    found = find_frames(paths, dark, layout)
+    found = find_frames(list(map(Path, paths)), list(map(Path, dark)), layout)
     isos = sorted({frame.iso for frame in found.frames})
     reader = _Reader(found, layout, progress)
     fits = [_fit_iso(reader, iso, tie_greens) for iso in isos]
