@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import replace
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -221,6 +222,16 @@ def test_a_training_that_validates_nothing_says_so(tmp_path: Path, capfd: pytest
         write_shard(shard_path(folder, 0), [stored(rng, number) for number in range(images)])
         train(folder, folder / "run", replace(CONFIG, steps=1, held_out=kept))
         assert capfd.readouterr().err.count("none is held out for validation") == is_noted
+
+
+@pytest.mark.parametrize("ends", [True, False], ids=["done", "interrupted"])
+def test_a_training_leaves_pytorch_as_it_was(ends: bool, data: Path, tmp_path: Path) -> None:
+    threads, state = torch.get_num_threads(), torch.get_rng_state()
+    config = replace(CONFIG, steps=2, threads=threads + 1)
+    with nullcontext() if ends else pytest.raises(KeyboardInterrupt):
+        train(data, tmp_path / "run", config, quiet=ends, progress=None if ends else interrupted_after(1))
+    assert torch.get_num_threads() == threads
+    assert torch.equal(torch.get_rng_state(), state)
 
 
 def test_a_folder_is_one_training_s_at_a_time(data: Path, tmp_path: Path) -> None:

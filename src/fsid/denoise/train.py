@@ -67,9 +67,25 @@ def train(
     record of the run. progress(done, steps) is called in place of the live line. Under `torchrun` or
     `accelerate launch` each process draws batches of its own and gradients are averaged. Raises FsidError for
     unusable data or settings, another run in `run_dir`, another process at work there, or a training that
-    diverges.
+    diverges. PyTorch's number of threads and its random numbers on the CPU are afterwards what they were.
     """
-    data_dir, run_dir = Path(data_dir), Path(run_dir)
+    threads = torch.get_num_threads()
+    try:
+        with torch.random.fork_rng(devices=()):
+            return _train(Path(data_dir), Path(run_dir), config, resume, quiet, command, progress)
+    finally:
+        torch.set_num_threads(threads)
+
+
+def _train(
+    data_dir: Path,
+    run_dir: Path,
+    config: TrainConfig,
+    resume: bool,
+    quiet: bool,
+    command: str,
+    progress: Callable[[int, int], None] | None,
+) -> Path:
     if config.threads:
         torch.set_num_threads(config.threads)
     gpu = torch.cuda.is_available()
