@@ -289,6 +289,17 @@ def test_every_length_is_permuted() -> None:
 SEEDS = ((0, 0), (0, 1), (1, 0))
 
 
+def test_a_step_may_be_a_number_of_numpy(dataset: Path) -> None:
+    patches = PatchDataset(dataset, CONFIG, seed=0)
+    assert equal(patches[np.int64(5)], patches[5])
+
+
+@pytest.mark.parametrize("wrong", [{"size_px": 0}, {"batch": 0}, {"noise": "Fresh"}])
+def test_patches_that_are_none_are_refused(wrong: dict) -> None:
+    with pytest.raises(FsidError, match=next(iter(wrong))):
+        replace(CONFIG, **wrong)
+
+
 def test_neighbours_of_an_order_are_unrelated() -> None:
     order = np.array([shuffled(place, 4096, 5, 2) for place in range(4096)])
     assert abs(np.corrcoef(order[:-1], order[1:])[0, 1]) < 0.05

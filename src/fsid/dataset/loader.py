@@ -25,11 +25,12 @@ swapped with it.
 
 from __future__ import annotations
 
+import operator
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 import torch
@@ -81,6 +82,12 @@ class PatchConfig:
     iso_max: float
     held_out: int = 0
     noise: Noise = "fresh"
+
+    def __post_init__(self) -> None:
+        if self.size_px < 1 or self.batch < 1:
+            raise FsidError(f"size_px {self.size_px}, batch {self.batch}: must be at least 1")
+        if self.noise not in get_args(Noise):
+            raise FsidError(f"noise: {self.noise!r} is not one of {', '.join(get_args(Noise))}")
 
 
 class PatchDataset(Dataset[Batch]):
@@ -149,7 +156,10 @@ class PatchDataset(Dataset[Batch]):
 
     def fill(self, batch: Batch, step: int) -> None:
         """Make the batch of a step in the memory of `batch`."""
-        config = self._config
+        config, step = (
+            self._config,
+            operator.index(step),
+        )  # a sampler may give NumPy's numbers, which overflow
         rng = np.random.default_rng([self._seed, step, self._rank])
         noisy, clean, k, sigma2 = (t.numpy() for t in (batch.noisy, batch.clean, batch.k, batch.sigma2))
         if config.noise == "fresh":
