@@ -312,6 +312,8 @@ def test_the_python_interface(noisy_file: Path, network: Path) -> None:
     clean = fsid.denoise(raw, model=model)
     np.testing.assert_array_equal(clean.mosaic, denoise_raw(raw, model).mosaic)
     np.testing.assert_array_equal(fsid.denoise(raw, "galaxy-s22", model=network, iso=raw.iso).cfa, clean.cfa)
+    loaded = fsid.denoise(raw, load_profile("galaxy-s22"), model=model, iso=800)
+    np.testing.assert_array_equal(loaded.mosaic, fsid.denoise(raw, "galaxy-s22", model=model, iso=800).mosaic)
     fsid.write_dng(noisy_file.with_name("out.dng"), clean)
     stored = read_raw(noisy_file.with_name("out.dng")).mosaic
     np.testing.assert_allclose(stored, clean.mosaic.clip(max=1), atol=1e-4)

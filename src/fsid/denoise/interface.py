@@ -12,7 +12,7 @@ from fsid.denoise.files import noise_of
 from fsid.denoise.model import load_denoiser, model_path
 from fsid.denoise.onnx_denoiser import load_onnx, onnx_denoiser
 from fsid.errors import FsidError
-from fsid.sensor import Raw, clean_levels
+from fsid.sensor import CameraProfile, Raw, clean_levels
 
 Backend = Literal["torch", "onnx"]
 
@@ -40,7 +40,7 @@ def load_model(model: str | Path | None = None, backend: Backend | None = None) 
 
 def denoise(
     raw: Raw,
-    profile: str | Path | None = None,
+    profile: str | Path | CameraProfile | None = None,
     *,
     iso: float | None = None,
     model: Network | str | Path | None = None,
@@ -48,11 +48,14 @@ def denoise(
 ) -> Raw:
     """The clean estimate of `raw`, with levels fine enough to store it, as `fsid denoise` makes it.
 
-    profile: a camera's noise profile, by name or file, taken at `iso` or at the ISO of `raw`; None takes the
-    noise level that `raw` knows, and else estimates it from the image. model: see `load_model`; load it once
-    to denoise many images. strength: 0..1 is the share of the noise that is removed, above 1 smooths more.
-    Raises FsidError.
+    profile: a camera's noise profile, by name, file or as it was loaded, taken at `iso` or at the ISO of
+    `raw`; None takes the noise level that `raw` knows, and else estimates it from the image. model: see
+    `load_model`; load it once to denoise many images. strength: 0..1 is the share of the noise that is
+    removed, above 1 smooths more. Raises FsidError.
     """
     network = load_model(model) if model is None or isinstance(model, str | Path) else model
-    noise = noise_of(raw, None if profile is None else str(profile), iso, Path(raw.camera))
-    return clean_levels(denoise_raw(raw, network, noise.level, strength=strength))
+    if isinstance(profile, CameraProfile):
+        level = profile.level(raw.iso if iso is None else iso)
+    else:
+        level = noise_of(raw, None if profile is None else str(profile), iso, Path(raw.camera)).level
+    return clean_levels(denoise_raw(raw, network, level, strength=strength))
