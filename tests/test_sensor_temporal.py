@@ -31,6 +31,14 @@ def test_a_steady_burst_is_left_alone(rng):
     assert stats.moved_share == 0
 
 
+def test_a_sensor_without_filters_is_named_as_in_its_profile(rng):
+    stats = burst(exposure(rng) for _ in range(10))
+    found, expected = (
+        fit_noise([stats], cfa=cfa, white_level=WHITE, black_level=BLACK) for cfa in ("MONO", None)
+    )
+    assert (found.k_dn, found.sigma2_dn) == (expected.k_dn, expected.sigma2_dn)
+
+
 def test_flicker_and_drift_do_not_count_as_noise(rng):
     """A lamp that varies by 3 % would add (0.03 * 2400)^2 DN^2 to the brightest pixels, twice their noise."""
     gains, drifts = rng.uniform(0.97, 1.03, 30), rng.uniform(-3, 3, 30)

@@ -22,6 +22,7 @@ import numpy as np
 from scipy.special import gammaincinv
 
 from fsid.errors import FsidError
+from fsid.sensor.camera_profile import MONO
 from fsid.sensor.quantise import ROUNDING_DN2
 from fsid.sensor.stored_noise import PLACES, before_clipping, before_rounding, dark_noise
 from fsid.sensor.temporal import TemporalStatistics
@@ -89,8 +90,10 @@ def fit_noise(
 ) -> NoiseFit:
     """The noise line of one ISO from one or more bursts of any exposures.
 
-    cfa: None for a monochrome sensor. black_level: DN, needed where there are no `dark` frames.
+    cfa: None or "MONO" for a monochrome sensor. black_level: DN, needed where there are no `dark` frames.
+    FsidError where neither is given, or the bursts show less than two light levels.
     """
+    cfa = None if cfa == MONO else cfa
     if dark is not None:
         dark_samples, black = pool_dark(dark, cfa, white_level)
         pooled = [dark_samples]
