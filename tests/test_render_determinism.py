@@ -8,6 +8,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from ctypes import c_int, c_uint, c_void_p
 from dataclasses import replace
 
@@ -252,6 +253,11 @@ def test_samples_per_pixel_agree_on_average(renderer: Renderer) -> None:
 def test_a_second_renderer_is_refused(renderer: Renderer) -> None:
     with pytest.raises(FsidError, match="already open"):
         Renderer()
+
+
+def test_another_thread_is_told_why_it_cannot_render(renderer: Renderer) -> None:
+    with ThreadPoolExecutor(1) as threads, pytest.raises(FsidError, match="thread that opened it"):
+        threads.submit(renderer.render, sample(SceneConfig(), 7, width=32, height=32)).result()
 
 
 def test_a_closed_renderer_says_so(renderer: Renderer) -> None:

@@ -11,6 +11,7 @@ what is resident (texture slots) are addressed by whole numbers, and everything 
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from types import TracebackType
@@ -58,7 +59,8 @@ class Renderer:
     quality: "high", or "fast" with fewer taps and coarser shadow maps (docs/render.md has both measured).
     lens_images: at most so many images, seen from places on the lens, make one with depth of field; each is
     blurred by its depth for the part of the lens that it stands for.
-    Raises FsidError where OpenGL 4.3 is missing or a second Renderer is opened in one process.
+    Raises FsidError where OpenGL 4.3 is missing or a second Renderer is opened in one process. The thread
+    that opens it is the one that renders: OpenGL knows a context in one thread only.
     """
 
     _active: ClassVar[Renderer | None] = None
@@ -89,6 +91,7 @@ class Renderer:
         self._grid = supersampling
         return_large_blocks()
         self._context = open_context(device_index)
+        self._thread = threading.get_ident()
         Renderer._active = self
         try:
             self._prepare(texture_size)
@@ -180,6 +183,8 @@ class Renderer:
         """
         if Renderer._active is not self:
             raise FsidError("this Renderer is closed")
+        if threading.get_ident() != self._thread:
+            raise FsidError("a Renderer works in the thread that opened it; open and use it in one thread")
         asked = view.camera
         camera, margin = with_margin(asked)
         view = replace(view, camera=camera)
