@@ -2,6 +2,7 @@
 
 import json
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -75,3 +76,12 @@ def test_a_background_has_all_its_surfaces(data):
     data["background"]["kind"] = "tabletop"
     with pytest.raises(FsidError, match=r"background\.materials must be one material for each of .*table"):
         scene_from_json(json.dumps(data))
+
+
+def test_a_scene_of_numpy_numbers_is_the_same():
+    sizes = [{"width": 64, "height": 48}, {"width": np.int64(64), "height": np.uint16(48)}]
+    plain, numpy = (
+        scene_to_json(sample(SceneConfig(), kind(7), **s))
+        for kind, s in zip((int, np.int64), sizes, strict=True)
+    )
+    assert numpy == plain

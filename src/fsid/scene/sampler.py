@@ -16,6 +16,7 @@ Background, lights and cameras vary alike in all four.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import index
 from typing import NamedTuple
 
 import numpy as np
@@ -67,6 +68,7 @@ def sample(
 
     seed: >= 0. width, height: even, 16 .. 16384. variant: one of VARIANTS. Raises FsidError.
     """
+    seed, width, height = (index(value) for value in (seed, width, height))  # NumPy's are no JSON
     _check(seed, width, height, variant)
     streams, fixed = _streams(seed), _streams(_FIXED_SEED)
     B, mood = background_rand(np.random.default_rng(streams.B), config)
