@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 import sys
 import tarfile
 import time
@@ -168,6 +169,15 @@ def test_loading_processes_change_nothing(processes: int, dataset: Path) -> None
         assert equal(batch, patches[step])
         places.add(batch.noisy.data_ptr())
     assert not processes or len(places) == 2 * processes + 1
+
+
+def test_the_loop_of_the_guide_runs(dataset: Path, monkeypatch, capsys) -> None:
+    guide = Path(__file__).resolve().parents[1] / "docs" / "generate.md"
+    (block,) = re.findall(r"```python\n(from torch.*?)```", guide.read_text(encoding="utf-8"), re.S)
+    (dataset / "data").symlink_to(dataset)
+    monkeypatch.chdir(dataset)
+    exec(compile(block, "generate.md", "exec"), {})
+    assert capsys.readouterr().out.count("torch.Size([4, 4, 16, 16])") == 20
 
 
 def test_unusable_datasets_are_named(dataset: Path, tmp_path: Path) -> None:

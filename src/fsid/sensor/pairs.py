@@ -69,6 +69,7 @@ def noisy_from_clean(
 ) -> Raw:
     """One stored exposure of `clean` at `level`: noise, then the camera's own rounding and clipping.
 
+    clean: with the camera's levels, to which it is rounded; those of a clean DNG are 64 times finer.
     terms, unit, exposure_s: what the camera does beyond the paper's model; see `terms`.
     """
     injected = before_converter(level, clean.white_level - clean.black_level) if terms.quantisation else level
