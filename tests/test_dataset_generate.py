@@ -8,6 +8,7 @@ import json
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -240,6 +241,22 @@ def test_a_dataset_of_before_pictures_were_told_apart_goes_on(album: Path, tmp_p
     (album / "coffee.png").unlink()
     with pytest.raises(FsidError, match="3 then, 2 now"):
         generate(out, config, count=2)
+
+
+def test_settings_made_in_python_are_those_of_a_file(tmp_path: Path):
+    config = small("width=64", "height=48")
+    loose = replace(config, width=np.int64(64), cameras=["pixel6"])
+    assert generate(str(tmp_path / "out"), loose, count=np.int64(1), seed=np.int64(3)) == 1
+    assert generate(tmp_path / "out", loose, count=1, seed=3) == 0
+    assert generate(tmp_path / "out", replace(config, cameras=("pixel6",)), count=1, seed=3) == 0
+    for wrong, seed, words in (
+        (replace(config, width=64.0), 0, "config: width: 64.0"),
+        (replace(config, cameras="pixel6"), 0, r"config: cameras: 'pixel6' is not a list; write \[pixel6\]"),
+        (config, 1.5, "dataset: seed: 1.5"),
+    ):
+        with pytest.raises(FsidError, match=words):
+            generate(tmp_path / "wrong", wrong, count=1, seed=seed)
+    assert not (tmp_path / "wrong").exists()
 
 
 def test_unusable_pictures_are_named_before_anything_is_written(

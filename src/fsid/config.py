@@ -73,18 +73,23 @@ for _kind, _hook in ((int, _strict_int), (float, _strict_float), (bool, _strict_
 
 def to_plain(settings: Any) -> Any:
     """Dataclasses and tuples as dicts and lists, NumPy's numbers and paths as what YAML and JSON hold."""
-    plain = _CONVERTER.unstructure(settings)
+    if dataclasses.is_dataclass(settings):
+        return {field.name: to_plain(getattr(settings, field.name)) for field in dataclasses.fields(settings)}
+    if isinstance(settings, Mapping):
+        return {key: to_plain(item) for key, item in settings.items()}
+    if isinstance(settings, tuple | list):
+        return [to_plain(item) for item in settings]
+    if isinstance(settings, np.generic):
+        return settings.item()
+    return str(settings) if isinstance(settings, Path) else settings
 
-    def listed(value: Any) -> Any:
-        if isinstance(value, Mapping):
-            return {key: listed(item) for key, item in value.items()}
-        if isinstance(value, tuple | list):
-            return [listed(item) for item in value]
-        if isinstance(value, np.generic):
-            return value.item()
-        return str(value) if isinstance(value, Path) else value
 
-    return listed(plain)
+def as_read(settings: T, *, source: str) -> T:
+    """Settings made in Python as a file would give them: lists as tuples, NumPy's numbers as Python's.
+
+    FsidError, naming `source` and the key, for what no file could hold.
+    """
+    return from_plain(type(settings), to_plain(settings), source=source)
 
 
 def from_plain(kind: type[T], plain: Any, *, source: str) -> T:

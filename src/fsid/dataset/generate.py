@@ -7,13 +7,14 @@ goes on where it stopped, and one that is running keeps others out of its folder
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from fsid.assets import sky_sources
-from fsid.config import from_plain, read_yaml, save_settings, to_plain
+from fsid.config import as_read, from_plain, read_yaml, save_settings, to_plain
 from fsid.dataset.card import CARD, write_card
 from fsid.dataset.config import RENDERED, DatasetConfig, GenerateConfig
 from fsid.dataset.crew import Crew, LocalCrew, run
@@ -81,7 +82,7 @@ class _Shard:
 
 
 def generate(
-    out: Path,
+    out: str | Path,
     config: GenerateConfig,
     *,
     count: int,
@@ -105,7 +106,7 @@ def generate(
     """
     if count < 1:
         raise FsidError(f"--count {count}: must be at least 1")
-    workforce = workforce or Workforce(workers)
+    out, count, workforce = Path(out), operator.index(count), workforce or Workforce(workers)
     dataset = dataset_config(config, seed, shard_size)
     with _locked(out):
         if not is_begun(out, dataset):
@@ -126,13 +127,14 @@ def generate(
             list(run(workforce.crew(), [task], tasks_per_worker=1, lost=lost))
 
         if todo or not (out / CARD).exists():
-            settle(shards, config, seed, redraw)
+            settle(shards, dataset.generate, dataset.seed, redraw)
             write_card(out, dataset, shards, command)
     return total
 
 
 def dataset_config(config: GenerateConfig, seed: int, shard_size: int = 0) -> DatasetConfig:
     """The identity of the dataset of (config, seed); FsidError where what it names does not exist."""
+    config = as_read(config, source="config")
     for camera in config.cameras:
         load_bayer_profile(camera)
     check_cameras(config)
@@ -154,7 +156,7 @@ def dataset_config(config: GenerateConfig, seed: int, shard_size: int = 0) -> Da
     if shard_size < 1 or shard_size % pairs:
         raise FsidError(f"shard size {shard_size}: is not a multiple of the {pairs} pairs of a frame")
     digest = pictures_digest(pictures) if pictures else ""
-    return DatasetConfig(seed, shard_size, config, len(pictures), digest)
+    return as_read(DatasetConfig(seed, shard_size, config, len(pictures), digest), source="dataset")
 
 
 @contextmanager

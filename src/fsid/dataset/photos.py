@@ -38,12 +38,12 @@ def read_photo(path: str | Path) -> np.ndarray:
     return pixels[:height, :width]
 
 
-def check_photo(path: Path) -> None:
+def check_photo(path: str | Path) -> None:
     """FsidError where `read_photo` has one; a JPEG takes a quarter of its time, others little less."""
     _read(path, shrink=8)
 
 
-def _read(path: Path, shrink: int = 1) -> np.ndarray:
+def _read(path: str | Path, shrink: int = 1) -> np.ndarray:
     """As `read_photo`; a JPEG `shrink` times smaller, which its decoder does quickly."""
     try:
         with Image.open(path) as image:

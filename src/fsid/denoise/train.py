@@ -27,7 +27,7 @@ from rich.console import Console
 from rich.text import Text
 from torch import Tensor
 
-from fsid.config import load_settings, read_yaml, save_settings, to_plain
+from fsid.config import as_read, load_settings, read_yaml, save_settings, to_plain
 from fsid.dataset.feed import batches
 from fsid.dataset.index import identity
 from fsid.dataset.loader import Batch, PatchConfig, PatchDataset
@@ -69,7 +69,7 @@ def train(
     unusable data or settings, another run in `run_dir`, another process at work there, or a training that
     diverges. PyTorch's number of threads and its random numbers on the CPU are afterwards what they were.
     """
-    threads = torch.get_num_threads()
+    config, threads = as_read(config, source="config"), torch.get_num_threads()
     try:
         with torch.random.fork_rng(devices=()):
             return _train(Path(data_dir), Path(run_dir), config, resume, quiet, command, progress)
