@@ -50,7 +50,17 @@ def test_what_is_not_there_is_named(tmp_path: Path):
 def test_training(data: str, tmp_path: Path):
     pytest.importorskip("torch")
     from fsid.dataset.loader import PatchConfig, PatchDataset
-    from fsid.denoise import NetworkConfig, TrainConfig, load_history, load_model, save_model, train
+    from fsid.denoise import (
+        NetworkConfig,
+        TrainConfig,
+        denoise_file,
+        denoise_folder,
+        find_raws,
+        load_history,
+        load_model,
+        save_model,
+        train,
+    )
 
     assert PatchDataset(data, PatchConfig(8, 2, ("pixel6",), 400, 800), 0).mosaics == 2
     network = NetworkConfig(width=4, encoder_blocks=(1,), decoder_blocks=(1,))
@@ -58,6 +68,13 @@ def test_training(data: str, tmp_path: Path):
     run = str(tmp_path / "run")
     train(data, run, config, quiet=True)
     assert load_history(run)[0] == [1]
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / "a.dng").write_bytes(read_member(shard_path(data, 0), "00000000.clean.dng"))
+    found = find_raws(str(tmp_path / "in"))
+    model = load_model(run)
+    denoise_folder(list(map(str, found)), str(tmp_path / "out"), model, profile="pixel6", iso=800)
+    denoise_file(str(found[0]), str(tmp_path / "b.dng"), model, profile="pixel6", iso=800)
+    assert (tmp_path / "out" / "a.dng").read_bytes() == (tmp_path / "b.dng").read_bytes()
     model = load_model(run)
     save_model(str(tmp_path / "own.safetensors"), model.net.state_dict(), model.card)
     assert load_model(str(tmp_path / "own.safetensors")).card == model.card

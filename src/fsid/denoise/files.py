@@ -42,11 +42,12 @@ class Noise:
     source: str
 
 
-def find_raws(folder: Path, *, bare: bool = False) -> list[Path]:
+def find_raws(folder: str | Path, *, bare: bool = False) -> list[Path]:
     """The RAW files directly inside `folder`, sorted by name; FsidError where there is none.
 
     bare: those of bare mosaics instead, which a `Layout` is given for.
     """
+    folder = Path(folder)
     if not folder.is_dir():
         raise FsidError(f"{folder}: is not a folder of RAW files")
     try:
@@ -123,8 +124,8 @@ def noise_of(raw: Raw, profile: str | None, iso: float | None, path: Path) -> No
 
 
 def denoise_file(
-    source: Path,
-    target: Path,
+    source: str | Path,
+    target: str | Path,
     model: Network,
     *,
     profile: str | None = None,
@@ -138,6 +139,7 @@ def denoise_file(
     The noise level that was used is returned. FsidError: `denoise_raw`, unreadable input, another suffix, a
     folder that is not there, and `source` as `target`: an original cannot be made again.
     """
+    source, target = Path(source), Path(target)
     if target.suffix.lower() != ".dng":
         raise FsidError(f"{target}: a denoised RAW is written as .dng")
     if not target.parent.is_dir():
@@ -162,8 +164,8 @@ def denoise_file(
 
 
 def denoise_folder(
-    sources: list[Path],
-    target: Path,
+    sources: Sequence[str | Path],
+    target: str | Path,
     model: Network,
     *,
     profile: str | None = None,
@@ -178,11 +180,12 @@ def denoise_folder(
     failed: told of each file that cannot be denoised; FsidError says in the end how many they were. What is
     wrong with all of them `check_options` tells before.
     """
-    names = [source.stem for source in sources]
+    target, paths = Path(target), list(map(Path, sources))
+    names = [path.stem for path in paths]
     if twice := sorted({name for name in names if names.count(name) > 1}):
-        raise FsidError(f"{sources[0].parent}: several files would become {twice[0]}.dng; rename one")
+        raise FsidError(f"{paths[0].parent}: several files would become {twice[0]}.dng; rename one")
     targets = [target / f"{name}.dng" for name in names]
-    if {path.resolve() for path in targets} & {path.resolve() for path in sources}:
+    if {path.resolve() for path in targets} & {path.resolve() for path in paths}:
         raise FsidError(f"{target}: is the folder of the originals, which would be overwritten")
     is_new = not target.exists()
     try:
@@ -190,16 +193,16 @@ def denoise_folder(
     except OSError as error:
         raise FsidError(f"{target}: cannot be written ({error.strerror})") from None
     failures = 0
-    for done, (source, out) in enumerate(zip(sources, targets, strict=True)):
+    for done, (source, out) in enumerate(zip(paths, targets, strict=True)):
         try:
             denoise_file(source, out, model, profile=profile, iso=iso, strength=strength, layout=layout)
         except FsidError as error:
             failures += 1
             failed(error)
         if progress is not None:
-            progress(done + 1, len(sources))
+            progress(done + 1, len(paths))
     if failures:
-        if is_new and failures == len(sources):
+        if is_new and failures == len(paths):
             with contextlib.suppress(OSError):  # something else came to lie in it
                 target.rmdir()
-        raise FsidError(f"{failures} of {len(sources)} files could not be denoised")
+        raise FsidError(f"{failures} of {len(paths)} files could not be denoised")
