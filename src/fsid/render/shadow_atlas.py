@@ -34,7 +34,6 @@ class ShadowAtlas:
         self._depth.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._depth.repeat_x = self._depth.repeat_y = False
         self._moments = self._context.texture((size[0] // 2, size[1] // 2), 2, dtype="f4")
-        self._moments.build_mipmaps()
         self.framebuffer = self._context.framebuffer([], self._depth)
         self._to_moments: Any = self._context.framebuffer([self._moments])
         self._owned = [self.framebuffer, self._to_moments, self._depth, self._moments]
