@@ -35,6 +35,17 @@ def test_a_folder_imports_only_from_above(path: Path):
             assert folder not in ORDER or ORDER.index(folder) <= own, name
 
 
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_what_holds_arrays_is_equal_to_itself_alone(path: Path):
+    """A dataclass's own == asks for the truth of arrays that are compared, and raises."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ClassDef):
+            types = [ast.unparse(part.annotation) for part in node.body if isinstance(part, ast.AnnAssign)]
+            made = [text for text in map(ast.unparse, node.decorator_list) if text.startswith("dataclass")]
+            if any("ndarray" in text or "Tensor" in text for text in types):
+                assert all("eq=False" in text for text in made), node.name
+
+
 def test_pairs_need_no_pytorch():
     script = (
         "import sys, fsid.dataset, fsid.evaluate, fsid.evaluate.doctor, fsid.cli.main;"

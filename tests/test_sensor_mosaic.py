@@ -1,5 +1,7 @@
 """Mosaic arithmetic: every pixel keeps its colour, whatever the pattern, crop or flip."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -103,3 +105,10 @@ def test_a_raw_holds_whole_tiles_of_normalised_values(image, words):
     """DN for x were developed, and stored, as a white picture."""
     with pytest.raises(FsidError, match=words):
         _raw(image, "RGGB")
+
+
+def test_a_raw_is_equal_to_itself_alone():
+    raw = _raw(np.zeros((4, 4), np.float32), "RGGB")
+    assert raw in [raw]
+    assert len({raw, replace(raw, mosaic=raw.mosaic.copy())}) == 2
+    assert raw not in [replace(raw, mosaic=raw.mosaic.copy())]

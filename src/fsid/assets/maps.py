@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MaterialMaps:
     """Tileable square maps, all (S, S) float32 in [0, 1], S a power of two, row 0 = top (v = 0).
 

@@ -34,7 +34,7 @@ def rotation_matrix(x_deg: float = 0.0, y_deg: float = 0.0, z_deg: float = 0.0) 
     return rz @ ry @ rx
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Solid:
     """vertices (V, 3) metres, normals (V, 3) unit outward, faces (F, 3) counter-clockwise from outside."""
 

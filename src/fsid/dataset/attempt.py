@@ -46,7 +46,7 @@ Window = tuple[int, int, int, int]
 """Left, top, width, height in pixels of the truth."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Sample:
     """A pair and its record. `record` is plain data (JSON).
 
@@ -207,7 +207,7 @@ class _Source:
     is_linear: bool
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Shot:
     """One exposure of a frame: camera, brightness and colour. gains: (3,), None for photographs."""
 

@@ -34,7 +34,7 @@ PHOTO_CAMERA = "pixel6"
 Progress = Callable[[int, int], None]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Inspection:
     """The statistics of a set, of its reference, and their distances. `reference` is None without one."""
 

@@ -55,7 +55,7 @@ Noise = Literal["fresh", "stored"]
 Cut = Callable[[np.ndarray], np.ndarray]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Batch:
     """B training patches: noisy, clean (B, 4, h, w) normalised float32 in R, Gr, Gb, B; k, sigma2 (B, 4)."""
 

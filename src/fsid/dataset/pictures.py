@@ -27,7 +27,7 @@ _BEAUTY = "Combined"
 """Blender's name of the layer that holds all light."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Picture:
     """pixels: (H, W, 3) float32, H and W even; linear light where `is_linear`, else sRGB-encoded 0..1."""
 

@@ -52,7 +52,7 @@ class Looks:
         self.count = count
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Frame:
     """looks: (crops, 4). refused: why earlier attempts at it were."""
 

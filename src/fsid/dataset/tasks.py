@@ -46,7 +46,7 @@ class FlowRenderer(SceneRenderer, Protocol):
     def render(self, scene: Scene, camera_index: int = 0, flow_to: int | None = None) -> Frame: ...
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Views:
     """What one frame gives. Light of any unit, linear unless it comes from a photograph.
 

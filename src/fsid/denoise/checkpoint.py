@@ -24,7 +24,7 @@ CHECKPOINT_FILE = "checkpoint.safetensors"
 _MOMENTS = ("exp_avg", "exp_avg_sq")
 
 
-@dataclass
+@dataclass(eq=False)
 class TrainState:
     """What changes from step to step beside weights and optimizer.
 

@@ -25,7 +25,7 @@ _WINDOW_PX = 256
 _CAMERA = "pixel6"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Probe:
     """A noisy window and its truth (H, W)."""
 

@@ -30,7 +30,7 @@ _MAX_PHOTOS = 16
 _STREAM = 0x7A11DA7E  # apart from the streams of training batches
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Capture:
     """One noisy window, packed (1, 4, h, w) as the network takes it, its truth, and k, sigma2 (1, 4)."""
 

@@ -62,7 +62,7 @@ class ImageRow:
     ssim: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Crops:
     """A window of one image at one level, developed: (h, w, 3) sRGB 0..1, by method name."""
 

@@ -31,7 +31,7 @@ _MAX_COLOUR_CONTRAST = 0.5
 _MAX_FRINGE = 0.05
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Lens:
     """rotation: (3, 3), rows right, up, forward. position: (3,) metres. focal: x, y in half sizes.
 

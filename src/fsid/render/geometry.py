@@ -50,7 +50,7 @@ _SURFACE_TEXELS = 10
 _SURFACE_ROWS = 2048
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Geometry:
     """world: (V, 3) float32, points in the world. vertices: VERTEX (V,), normals in the world.
 

@@ -22,7 +22,7 @@ from fsid.render.parts import Surface
 from fsid.scene.model import Material
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Boxed:
     """positions, normals: (V, 3). uv: (V, 2) tiles, v down. tangents: (V, 4) as glTF has them, where u grows
     and on which side green is up. faces: (F, 3)."""

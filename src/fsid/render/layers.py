@@ -24,7 +24,7 @@ _SMALLEST = 64
 _STEP_LAYERS = 16
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Layer:
     """index: in the texture arrays. slope_scale and shares as in `Texels`. roughness, metallic: means."""
 

@@ -51,7 +51,7 @@ _NORMAL_STEPS, _STEPS_PER_M = 50, 50
 Layers = Mapping[tuple[str, int], Layer]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Mirror:
     """plane: (4,) unit normal n towards the viewer and offset d, n x = d. shot: the image that it shows."""
 
@@ -101,7 +101,7 @@ def clearest_mirror(view: View, overview: Overview, shot: Shot, layers: Layers) 
     return _mirror(np.array([*normal, level]), shot, float(roughness))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Polish:
     """Of the surfaces at some places, (N,) each. roughness: mean, 0..1. body, coat: how clear an image they
     show, 0..1. specular: reflectance of the body at normal incidence. background: no object."""

@@ -16,7 +16,7 @@ WIDTH = 64
 """Places along a row of the picture."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Overview:
     """count: places asked for. Of those where something was hit, (N,) or (N, 3): surface, its number in the
     table; normal and face_normal, unit, the face's towards the camera; position, metres; all in the world."""

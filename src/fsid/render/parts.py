@@ -17,7 +17,7 @@ from fsid.errors import FsidError
 from fsid.scene.model import Material, Motion, Scene
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Surface:
     """vertices: (V, 3) metres. normals: (V, 3) unit. faces: (F, 3) int."""
 
@@ -26,7 +26,7 @@ class Surface:
     faces: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Part:
     """One part of one body: its triangles in metric space (scaled, not turned), and where that is in the
     world: rotation (3, 3) @ vertex + position (3,). body and name: of the mesh and of its part."""

@@ -28,7 +28,7 @@ SKY_GRID = 64
 SKY_HALF_M = 1e5
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Room:
     """half_m, centre_m: (3,) of the box. sides: (6, 3) diffuse ambient radiance from +x -x +y -y +z -z.
 

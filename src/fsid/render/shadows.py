@@ -56,7 +56,7 @@ class Source:
     lamp: int = -1
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Tile:
     """origin: (3,) metres. axes: (3, 3) rows right, up, forward. focal: in half tiles. corner: texels.
 
@@ -71,7 +71,7 @@ class Tile:
     lamp: int
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ShadowPlan:
     """The tiles of all lights in an atlas of `size` texels, `tile_px` a side each; and the lights' table.
 
@@ -86,7 +86,7 @@ class ShadowPlan:
     table: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Field:
     """What one tile shows: as `Tile`, half: half of its field without the border, tangent units or metres."""
 

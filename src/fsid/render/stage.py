@@ -17,7 +17,7 @@ from fsid.render.sky import panorama
 from fsid.scene.model import Material
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Stage:
     """geometry: in the world. plan: lights and their shadow maps. room: what surrounds it as a light source.
 

@@ -53,7 +53,7 @@ class NoiseEstimate:
     sigma2_error: tuple[float, float, float, float]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Blocks:
     """Blocks of one site: mean, energy of low frequencies and of high ones, each per coefficient.
 
@@ -66,7 +66,7 @@ class _Blocks:
     share: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Pools:
     """Medians of smooth blocks: mean, variance, and how many independent coefficients stand behind each."""
 

@@ -45,7 +45,7 @@ _MIN_POOL_PIXELS = 50
 _REWEIGHTINGS = 10
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Samples:
     """Pooled pixels of one burst and one site.
 
@@ -65,7 +65,7 @@ class Samples:
         return Samples(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class NoiseFit:
     """The line in DN, its standard errors, the black level; (4,) each: R, Gr, Gb, B; (1,) without a CFA.
 

@@ -22,7 +22,7 @@ from fsid.sensor.terms import PAPER, NoiseTerms
 MONO = "MONO"  # stands in `cfa` for a sensor without colour filters; its four sites are alike
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Measurement:
     """How sure the levels are, one row per ISO: standard errors (n, 4), black level (n, 4) in DN, frames."""
 
@@ -47,7 +47,7 @@ class Optics:
     transmittance: float = 0.9
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CameraProfile:
     """One camera.
 
@@ -56,7 +56,7 @@ class CameraProfile:
     sigma2 may be impossible here, but not in what `level` returns.
     xyz_to_camera: (m, 3, 3) matrices for D65 (DNG `ColorMatrix1`); `colour.colour_rand` blends them.
     date: of the data. measured: None where the source states no errors. terms: beyond the paper's model.
-    optics: None where unknown.
+    optics: None where unknown. Two are equal (==) where they are one and the same object.
     """
 
     name: str

@@ -30,7 +30,7 @@ RELATIVE_ERROR = 0.1  # of a published value against the law, where no absolute 
 _REWEIGHTINGS = 10
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class IsoCurve:
     """Values of the four sites R, Gr, Gb, B at any ISO.
 

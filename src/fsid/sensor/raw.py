@@ -37,7 +37,7 @@ class NoiseLevel:
             raise FsidError(f"{self}: k and sigma2 are variances, finite and not negative")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Raw:
     """A Bayer image and its calibration.
 
@@ -47,6 +47,7 @@ class Raw:
     (the inverse of DNG `AsShotNeutral`).
     xyz_to_camera: (3, 3) DNG `ColorMatrix1` for D65, rows R, G, B.
     iso: 0 where unknown. noise: None where unknown. metadata: of the file it was read from.
+    Two are equal (==) where they are one and the same object; NumPy compares what they hold.
     FsidError for a mosaic of another shape, or of integers: `from_dn` makes x of DN.
     """
 

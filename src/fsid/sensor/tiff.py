@@ -53,7 +53,7 @@ class Tag:
     values: Values
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Directory:
     """Tags, the image they describe as one uncompressed strip, and directories that tags point to."""
 

@@ -31,7 +31,7 @@ _LINE = re.compile(r"^[ \t]*([\w.]+(?:#\d+)?)[ \t]*[=:][ \t]*(.*?)[ \t]*$", re.M
 _END_RECORD = struct.Struct("<4s4H2LH")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Entry:
     """One model. member: its name in the archive. size_m: (3,) width, depth, height, or None where the
     catalogue states none. rotation: (3, 3), y up. present: whether the archive has it."""

@@ -31,7 +31,7 @@ _GRID = 2**20
 """Points closer than 1 / _GRID of the largest side are one."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Triangles:
     """vertices: (V, 3) float64, any unit. faces: (F, 3) int64. parts: (F,) int64, index into `names`."""
 

@@ -19,7 +19,7 @@ OVERSAMPLING = 2
 GLOSS_EXPONENT = 60.0
 
 
-@dataclass
+@dataclass(eq=False)
 class Surface:
     """The drawing. albedo: (H, W, 3) linear 0..1. height: (H, W) pixels. gloss: (H, W) 0..1. All float32."""
 

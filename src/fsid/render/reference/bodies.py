@@ -37,7 +37,7 @@ _OPEN_SHARE = 12.0
 Bsdfs = Callable[[frozenset[str]], Any]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Body:
     """mesh: Mitsuba's. surface: its micropolygons in the world. albedo: (V, 3). object_id: as in `Frame`."""
 

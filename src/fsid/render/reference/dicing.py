@@ -23,7 +23,7 @@ _UNSEEN = 12.0
 """How much coarser what faces away or lies outside the image is."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class View:
     """Where pixels are. rotation: (3, 3) rows right, up, forward. position: (3,) metres. focal_px: focal
     length in pixels. half_px: (2,) half width and height. edge_px: longest edge that stays."""

@@ -26,7 +26,7 @@ _OFFSET = np.array([0.37, 0.61])
 _MASK = np.uint64(0xFFFFFFFF)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Points:
     """Where to evaluate, in the metric space of an object (scaled, not turned).
 
@@ -40,7 +40,7 @@ class Points:
     along_y: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Shading:
     """albedo: (N, 3). roughness, metallic: (N,). normal: (N, 3) unit with relief, metric space."""
 
