@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fsid.dataset import save_png
+from fsid.dataset import grid, save_png, to_uint8
 from fsid.errors import FsidError
 from fsid.files import write_atomically, write_together
 
@@ -43,6 +43,29 @@ def test_a_picture_that_cannot_be_written_leaves_the_old_one(
     with pytest.raises(FsidError, match=r"a\.png: cannot be written \(No space"):
         save_png(tmp_path / "a.png", picture + 255)
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {"a.png": before}
+
+
+@pytest.mark.parametrize(
+    ("pixels", "words"),
+    [
+        (np.full((2, 2, 3), 9, np.uint16), "uint16 values: give sRGB values in 0..1"),
+        (np.ones((2, 2, 3), bool), "bool values"),
+        (np.full((2, 2, 3), np.nan), "NaN"),
+        (np.zeros((3, 2, 2)), r"\(height, width, 3\); got \(3, 2, 2\)"),
+        (np.zeros((0, 2, 3)), r"got \(0, 2, 3\)"),
+    ],
+)
+def test_what_is_no_picture_is_not_written_as_one(tmp_path: Path, pixels: np.ndarray, words: str) -> None:
+    with pytest.raises(FsidError, match=words):
+        save_png(tmp_path / "a.png", pixels)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_grid_takes_what_can_be_written() -> None:
+    tile = np.full((2, 2, 3), 0.5)
+    np.testing.assert_array_equal(grid([tile]), grid([to_uint8(tile)]))
+    with pytest.raises(FsidError, match="at least one"):
+        grid([])
 
 
 @pytest.mark.parametrize("refused", ["folder", "missing/b", "x" * 254])

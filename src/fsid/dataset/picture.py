@@ -21,12 +21,16 @@ GAP_PX = 4
 
 
 def save_png(path: str | Path, srgb: np.ndarray) -> None:
-    """Write a (H, W, 3) sRGB image, 0..1 float or uint8, as PNG; FsidError where it cannot be written."""
+    """Write a (H, W, 3) sRGB image, 0..1 float or uint8, as PNG.
+
+    FsidError where it cannot be written, is of another shape, or is none that `to_uint8` takes.
+    """
     path = Path(path)
     check_png(path)
-    pixels = srgb if srgb.dtype == np.uint8 else to_uint8(srgb)
+    if srgb.ndim != 3 or srgb.shape[2] != 3 or not srgb.size:
+        raise FsidError(f"{path}: a picture must have shape (height, width, 3); got {srgb.shape}")
     buffer = io.BytesIO()
-    Image.fromarray(pixels).save(buffer, "PNG")
+    Image.fromarray(to_uint8(srgb)).save(buffer, "PNG")
     write_atomically(path, buffer.getvalue())
 
 
@@ -69,7 +73,12 @@ def _half(image: np.ndarray) -> np.ndarray:
 
 
 def grid(tiles: list[np.ndarray]) -> np.ndarray:
-    """(h, w, 3) uint8 tiles side by side, about as many columns as rows, on white; room for the largest."""
+    """(h, w, 3) tiles side by side, about as many columns as rows, on white, uint8; room for the largest.
+
+    FsidError where there is none, or one that `to_uint8` does not take.
+    """
+    if not tiles:
+        raise FsidError("a grid of pictures needs at least one")
     columns = int(np.ceil(np.sqrt(len(tiles))))
     rows = int(np.ceil(len(tiles) / columns))
     height, width = (max(tile.shape[axis] for tile in tiles) for axis in (0, 1))
@@ -78,5 +87,5 @@ def grid(tiles: list[np.ndarray]) -> np.ndarray:
     )
     for i, tile in enumerate(tiles):
         top, left = (i // columns) * (height + GAP_PX), (i % columns) * (width + GAP_PX)
-        sheet[top : top + len(tile), left : left + tile.shape[1]] = tile
+        sheet[top : top + len(tile), left : left + tile.shape[1]] = to_uint8(tile)
     return sheet

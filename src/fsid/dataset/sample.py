@@ -114,7 +114,16 @@ def _further_file(name: str, content: Raw | np.ndarray) -> tuple[str, bytes]:
 
 
 def to_uint8(srgb: np.ndarray) -> np.ndarray:
-    """(..., 3) sRGB-encoded 0..1 as 8-bit values."""
+    """(..., 3) sRGB-encoded 0..1 as 8-bit values, what is beyond clipped; 8-bit ones as they are.
+
+    FsidError for other integers, whose range nothing tells, and for NaN.
+    """
+    if srgb.dtype == np.uint8:
+        return srgb
+    if srgb.dtype.kind != "f":
+        raise FsidError(f"a picture of {srgb.dtype} values: give sRGB values in 0..1, or 8-bit ones (uint8)")
+    if np.isnan(srgb).any():
+        raise FsidError("a picture holds NaN; give sRGB values in 0..1")
     levels = np.clip(srgb, 0.0, 1.0)
     levels *= 255.0
     return np.round(levels, out=levels).astype(np.uint8)

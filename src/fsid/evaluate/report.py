@@ -77,8 +77,7 @@ def write_report(file: Path, title: str, lead: str, sections: Sequence[Section])
 def picture(srgb: np.ndarray, caption: str = "", *, pixelated: bool = False) -> Picture:
     """A (H, W, 3) sRGB 0..1 array (or uint8) as a picture."""
     data = io.BytesIO()
-    pixels = srgb if srgb.dtype == np.uint8 else to_uint8(srgb)
-    Image.fromarray(pixels).save(data, format="PNG", optimize=True)
+    Image.fromarray(to_uint8(srgb)).save(data, format="PNG", optimize=True)
     return Picture(_uri(data.getvalue()), caption, pixelated)
 
 
