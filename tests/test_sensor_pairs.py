@@ -84,3 +84,19 @@ def test_a_developed_photo_keeps_its_neutral_colours():
 def test_a_photo_of_bytes_is_refused():
     with pytest.raises(FsidError, match="255"):
         clean_from_photo(np.random.default_rng(0), np.full((4, 4, 3), 128, np.uint8), load_profile("pixel6"))
+
+
+@pytest.mark.parametrize(
+    ("light", "words"),
+    [
+        (np.full((4, 4, 3), 128, np.uint8), "floating-point, 1 = saturation; got uint8"),
+        (np.full((4, 4, 3), np.nan, np.float32), "NaN or infinity"),
+        (np.full((4, 4, 3), np.inf, np.float32), "NaN or infinity"),
+        (np.full((4, 4, 3), -np.inf, np.float32), "NaN or infinity"),
+        (np.zeros((3, 4, 4), np.float32), r"shape \(height, width, 3\), RGB; got \(3, 4, 4\)"),
+        (np.zeros((4, 4), np.float32), r"got \(4, 4\)"),
+    ],
+)
+def test_what_is_no_light_is_refused(light: np.ndarray, words: str):
+    with pytest.raises(FsidError, match=words):
+        clean_from_linear(np.random.default_rng(0), light, load_profile("pixel6"))

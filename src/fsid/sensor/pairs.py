@@ -22,7 +22,7 @@ from fsid.sensor.profiles import CameraProfile
 from fsid.sensor.quantise import quantise
 from fsid.sensor.raw import NoiseLevel, Raw
 from fsid.sensor.terms import PAPER, NoiseTerms, add_noise_terms
-from fsid.sensor.unprocess import check_srgb, linear_to_camera, unprocess
+from fsid.sensor.unprocess import check_linear, check_srgb, linear_to_camera, unprocess
 
 if TYPE_CHECKING:  # RAW files are read and developed on machines without a graphics library
     from fsid.render.frame import Frame
@@ -40,8 +40,9 @@ def clean_from_frame(rng: np.random.Generator, frame: Frame, profile: CameraProf
 def clean_from_linear(rng: np.random.Generator, linear_srgb: np.ndarray, profile: CameraProfile) -> Raw:
     """Linear light (H, W, 3), 1 = saturation, seen through random colour of `profile`: float Raw in 0..1.
 
-    An odd last row or column is dropped.
+    An odd last row or column is dropped. FsidError for another shape, integers, NaN and infinity.
     """
+    check_linear(linear_srgb)
     matrix, gains = colour_rand(rng, profile.xyz_to_camera)
     return _raw(linear_to_camera(_even(linear_srgb), matrix, gains), matrix, gains, profile)
 

@@ -12,6 +12,7 @@ and the sensor clips it where its own channels saturate. Images are NumPy arrays
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -82,3 +83,16 @@ def check_srgb(srgb: Any) -> None:
         raise FsidError(f"a photo must have shape (height, width, 3); got {srgb.shape}: convert it to RGB")
     if not (srgb.min() >= 0 and srgb.max() <= 1):
         raise FsidError("a photo must hold finite values in 0..1; divide 8-bit values by 255")
+
+
+def check_linear(linear: Any) -> None:
+    """FsidError unless `linear` is (H, W, 3) with finite floating-point values."""
+    if linear.ndim != 3 or linear.shape[2] != 3:
+        raise FsidError(f"linear light must have shape (height, width, 3), RGB; got {linear.shape}")
+    if isinstance(linear, np.ndarray) and linear.dtype.kind != "f":
+        raise FsidError(
+            f"linear light must be floating-point, 1 = saturation; got {linear.dtype}. Photographs are not "
+            "linear: clean_from_photo takes them"
+        )
+    if not (linear.min() > -math.inf and linear.max() < math.inf):
+        raise FsidError("linear light must hold finite values; it has NaN or infinity")
