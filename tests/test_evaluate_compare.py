@@ -6,6 +6,7 @@ import dataclasses
 import json
 import os
 import shutil
+from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -113,6 +114,21 @@ def test_a_method_may_work_in_place(small_set: Path):
     alone = compare(small_set, [NOISY]).rows
     rows = compare(small_set, iter([Method("mine", "", blackened), NOISY])).rows
     assert [row for row in rows if row.model == "noisy"] == list(alone)
+
+
+@pytest.mark.parametrize(
+    ("denoise", "words"),
+    [
+        (lambda raw: raw.mosaic, r"mine: denoise returns a Raw, replace\(raw, mosaic=...\); got ndarray"),
+        (lambda raw: None, "got NoneType"),
+        (lambda raw: dataclasses.replace(raw, mosaic=raw.mosaic[:-2]), "makes 200x158 GBRG of 200x160 GBRG"),
+        (lambda raw: dataclasses.replace(raw, cfa="RGGB"), "makes 200x160 RGGB of 200x160 GBRG"),
+        (lambda raw: dataclasses.replace(raw, mosaic=raw.mosaic * np.nan), "mine: .*NaN"),
+    ],
+)
+def test_a_method_that_breaks_the_image_is_named(small_set: Path, denoise: Callable, words: str):
+    with pytest.raises(FsidError, match=words):
+        compare(small_set, [NOISY, Method("mine", "", denoise)])
 
 
 def test_nothing_to_compare_is_said(small_set: Path):

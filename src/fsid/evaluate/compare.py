@@ -26,7 +26,7 @@ from fsid.sensor import Raw, develop, read_raw, upright
 class Method:
     """A denoiser under test. training: what it was trained on, in words ("" for the baselines).
 
-    denoise: may change what it is given, which is a copy.
+    denoise: may change what it is given, which is a copy; returns a finite Raw of the same size and CFA.
     """
 
     name: str
@@ -98,7 +98,8 @@ def compare(
     """Run every method on every capture of the test set in `root`.
 
     crop_levels: levels of which a window of every image is kept; crop_px: its edge in pixels.
-    Rows cover each set, and all sets together where there is more than one.
+    Rows cover each set, and all sets together where there is more than one. FsidError: an unusable test set,
+    or a method whose result is not as `Method` says.
     """
     root = Path(root)
     testset = read_testset(root)
@@ -120,7 +121,7 @@ def compare(
         frames = [_noisy(testset.noisy(root, image, level, n), truth) for n in range(testset.frames)]
         outputs, shown_psnr = {}, {}
         for method in methods:
-            results = [method.denoise(replace(frame, mosaic=frame.mosaic.copy())) for frame in frames]
+            results = [_denoised(method, frame) for frame in frames]
             developed = [develop(result) for result in results]
             outputs[method.name] = developed[0]
             figures = [
@@ -142,6 +143,22 @@ def _noisy(path: Path, truth: Raw) -> Raw:
     if truth.mosaic.shape != noisy.mosaic.shape or truth.cfa != noisy.cfa:
         raise FsidError(f"{path}: size or CFA differs from its clean.dng")
     return noisy
+
+
+def _denoised(method: Method, frame: Raw) -> Raw:
+    result = method.denoise(replace(frame, mosaic=frame.mosaic.copy()))
+    if not isinstance(result, Raw):
+        kind = type(result).__name__
+        raise FsidError(f"{method.name}: denoise returns a Raw, replace(raw, mosaic=...); got {kind}")
+    if (result.mosaic.shape, result.cfa) != (frame.mosaic.shape, frame.cfa):
+        (height, width), (high, wide) = result.mosaic.shape, frame.mosaic.shape
+        raise FsidError(
+            f"{method.name}: denoise makes {width}x{height} {result.cfa} of {wide}x{high} {frame.cfa}; "
+            "it must keep size and CFA"
+        )
+    if not np.isfinite(result.mosaic).all():
+        raise FsidError(f"{method.name}: denoise makes NaN or infinity, which nothing can be measured of")
+    return result
 
 
 def detailed_window(srgb: np.ndarray, size_px: int) -> tuple[tuple[slice, slice], float]:
