@@ -69,8 +69,18 @@ def test_the_test_bench_takes_lux(photos, tmp_path):
 def test_what_cannot_be_computed_is_named(tmp_path):
     with pytest.raises(FsidError, match=r"galaxy-s20-fe.*optics"):
         light_level(load_profile("galaxy-s20-fe"), 1)
-    with pytest.raises(FsidError, match="lux"):
-        light_level(PIXEL, 0)
+    for lux in (0, -1, float("nan"), float("inf")):
+        for light in (light_level, electrons_per_second):
+            with pytest.raises(FsidError, match=f"light of {lux} lux"):
+                light(PIXEL, lux)
+    with pytest.raises(FsidError, match="reflectance 0"):
+        light_level(PIXEL, 1, reflectance=0)
+    for seconds in (0, float("nan")):
+        with pytest.raises(FsidError, match=f"longest_exposure_s {seconds}: must be above 0"):
+            light_level(PIXEL, 1, longest_exposure_s=seconds)
+    for iso in (10, 0, -5, float("nan")):
+        with pytest.raises(FsidError, match=rf"highest_iso {iso}: .* 49, the lowest ISO of profile pixel6"):
+            light_level(PIXEL, 1, highest_iso=iso)
     save_profile(tmp_path / "p.yaml", PIXEL)
     assert load_profile(tmp_path / "p.yaml").optics == PIXEL.optics
     text = (tmp_path / "p.yaml").read_text()

@@ -15,6 +15,7 @@ its filter, lens transmittance 0.9, no vignetting, no flare. Each may be wrong b
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 from fsid.errors import FsidError
@@ -57,16 +58,19 @@ def light_level(
     highest_iso: float | None = None,
     reflectance: float = GREY,
 ) -> LightLevel:
-    """Auto-exposure of the camera in a scene of `lux`. FsidError: no optics in the profile, lux <= 0."""
-    if profile.optics is None:
-        raise FsidError(
-            f"profile {profile.name}: has no optics; add `optics: {{f_number: ..., pixel_pitch_um: ...}}`"
-        )
-    if not (lux > 0 and longest_exposure_s > 0 and reflectance > 0):
-        raise FsidError(f"light level: {lux} lux and {longest_exposure_s} s must be positive")
+    """Auto-exposure of the camera in a scene of `lux`.
+
+    FsidError: as `electrons_per_second`, a time of 0 and less, a highest ISO below the lowest of the profile.
+    """
     rate = electrons_per_second(profile, lux, reflectance)
+    if not longest_exposure_s > 0:
+        raise FsidError(f"longest_exposure_s {longest_exposure_s}: must be above 0")
     lowest = min(profile.iso)
-    highest = highest_iso or BEYOND_TABLE * max(profile.iso)
+    highest = BEYOND_TABLE * max(profile.iso) if highest_iso is None else highest_iso
+    if not highest >= lowest:
+        raise FsidError(
+            f"highest_iso {highest}: must be at least {lowest:g}, the lowest ISO of profile {profile.name}"
+        )
     time = min(max(KEY / _gain(profile, lowest) / rate, SHORTEST_EXPOSURE_S), longest_exposure_s)
     electrons = rate * time
     iso = _iso_of_gain(profile, KEY / electrons, lowest, highest)
@@ -74,10 +78,17 @@ def light_level(
 
 
 def electrons_per_second(profile: CameraProfile, lux: float, reflectance: float = GREY) -> float:
-    """At a green pixel that sees a surface of `reflectance` in `lux`."""
+    """At a green pixel that sees a surface of `reflectance` in `lux`.
+
+    FsidError: no optics in the profile, lux or reflectance not finite and above 0.
+    """
     optics = profile.optics
     if optics is None:
-        raise FsidError(f"profile {profile.name}: has no optics")
+        raise FsidError(
+            f"profile {profile.name}: has no optics; add `optics: {{f_number: ..., pixel_pitch_um: ...}}`"
+        )
+    if not (0 < lux < math.inf and 0 < reflectance < math.inf):
+        raise FsidError(f"light of {lux} lux, reflectance {reflectance}: both must be finite and above 0")
     on_sensor = lux * reflectance * optics.transmittance / (4 * optics.f_number**2)
     area_m2 = (optics.pixel_pitch_um * 1e-6) ** 2
     return on_sensor * PHOTONS_PER_LUX_M2_S * area_m2 * optics.quantum_efficiency
