@@ -24,8 +24,11 @@ from fsid.dataset import (
     GenerateConfig,
     dataset_config,
     generate,
+    make_frame,
     make_only,
+    make_sample,
     read_member,
+    scene_of,
     shard_keys,
     shard_path,
 )
@@ -102,6 +105,16 @@ def test_settings_of_something_else_are_not_replaced(photos: Path, tmp_path: Pat
     with pytest.raises(FsidError, match=r"config\.yaml: seed"):
         generate(tmp_path, small(f"images={photos}"), count=1)
     assert (tmp_path / "config.yaml").read_text() == "steps: 30\n"
+
+
+def test_there_is_no_sample_before_the_first():
+    for make in (scene_of, lambda *place: make_sample(*place, None)):
+        with pytest.raises(FsidError, match="index -1: must not be negative"):
+            make(small(), 0, -1)
+        with pytest.raises(FsidError, match="seed -1: must not be negative"):
+            make(small(), -1, 0)
+    with pytest.raises(FsidError, match="frame -1: must not be negative"):
+        make_frame(small(), 0, -1, None)
 
 
 def test_a_pair_opens_in_libraw_and_differs_by_its_stated_noise(scenes: Path):

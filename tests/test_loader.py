@@ -180,6 +180,13 @@ def test_the_loop_of_the_guide_runs(dataset: Path, monkeypatch, capsys) -> None:
     assert capsys.readouterr().out.count("torch.Size([4, 4, 16, 16])") == 20
 
 
+def test_there_is_no_step_before_the_first(dataset: Path) -> None:
+    with pytest.raises(FsidError, match="seed -1: must not be negative"):
+        PatchDataset(dataset, CONFIG, seed=-1)
+    with pytest.raises(FsidError, match="step -1: must not be negative"):
+        PatchDataset(dataset, CONFIG, seed=0)[-1]
+
+
 def test_unusable_datasets_are_named(dataset: Path, tmp_path: Path) -> None:
     with pytest.raises(FsidError, match="too small for patches"):
         PatchDataset(dataset, replace(CONFIG, size_px=20), seed=0)

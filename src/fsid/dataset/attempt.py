@@ -28,6 +28,7 @@ from fsid.dataset.tasks import (
     views_of_light,
     views_of_scene,
 )
+from fsid.errors import FsidError
 from fsid.scene import Scene
 from fsid.scene import sample as sample_scene
 from fsid.sensor import (
@@ -64,13 +65,21 @@ class Sample:
 
 @dataclass(frozen=True)
 class Attempt:
-    """refused: why the earlier attempts were. scene: where it is known already; else it is drawn."""
+    """refused: why the earlier attempts were. scene: where it is known already; else it is drawn.
+
+    FsidError for a negative seed or frame.
+    """
 
     config: GenerateConfig
     seed: int
     frame: int
     refused: tuple[str, ...] = ()
     scene: Scene | None = None
+
+    def __post_init__(self) -> None:
+        for key in ("seed", "frame"):
+            if getattr(self, key) < 0:
+                raise FsidError(f"{key} {getattr(self, key)}: must not be negative")
 
     def samples(self, renderer: SceneRenderer | None) -> list[Sample] | str:
         """All samples of the frame, or what is wrong with it."""

@@ -94,7 +94,8 @@ class PatchDataset(Dataset[Batch]):
     """`dataset[step]` is the batch of that step; see the module docstring. Validation scenes are left out.
 
     `feed.batches` has other processes make them. rank, world: this process among those that train together;
-    None asks `torch.distributed`, and is 0 of 1 where that was not set up.
+    None asks `torch.distributed`, and is 0 of 1 where that was not set up. FsidError: a negative seed or
+    step, and what is wrong with the data or the configuration.
     """
 
     def __init__(
@@ -108,6 +109,8 @@ class PatchDataset(Dataset[Batch]):
         data_dir = Path(data_dir)
         if not config.profiles:
             raise FsidError("profiles: name at least one camera profile to draw noise from")
+        if seed < 0:
+            raise FsidError(f"seed {seed}: must not be negative")
         own_rank, all_ranks = _place_among_processes()
         self._rank = own_rank if rank is None else rank
         self._world = all_ranks if world is None else world
@@ -156,10 +159,9 @@ class PatchDataset(Dataset[Batch]):
 
     def fill(self, batch: Batch, step: int) -> None:
         """Make the batch of a step in the memory of `batch`."""
-        config, step = (
-            self._config,
-            operator.index(step),
-        )  # a sampler may give NumPy's numbers, which overflow
+        config, step = self._config, operator.index(step)  # NumPy's numbers, as a sampler's, overflow
+        if step < 0:
+            raise FsidError(f"step {step}: must not be negative")
         rng = np.random.default_rng([self._seed, step, self._rank])
         noisy, clean, k, sigma2 = (t.numpy() for t in (batch.noisy, batch.clean, batch.k, batch.sigma2))
         if config.noise == "fresh":

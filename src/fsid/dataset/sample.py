@@ -28,7 +28,7 @@ ATTEMPTS = 8
 
 def scene_of(config: GenerateConfig, seed: int, index: int) -> Scene:
     """The scene of sample `index` (of its first attempt, which the checks seldom refuse)."""
-    return Attempt(config, seed, index // config.pairs_per_frame).drawn_scene()
+    return Attempt(config, seed, _place_of(config, index)[0]).drawn_scene()
 
 
 def make_sample(config: GenerateConfig, seed: int, index: int, renderer: SceneRenderer | None) -> Sample:
@@ -36,8 +36,15 @@ def make_sample(config: GenerateConfig, seed: int, index: int, renderer: SceneRe
 
     renderer: needed unless `config.images` names a folder of pictures. FsidError as in `make_frame`.
     """
-    frame, place = divmod(index, config.pairs_per_frame)
+    frame, place = _place_of(config, index)
     return make_frame(config, seed, frame, renderer)[place]
+
+
+def _place_of(config: GenerateConfig, index: int) -> tuple[int, int]:
+    """The frame of a sample, and which of its samples it is."""
+    if index < 0:
+        raise FsidError(f"index {index}: must not be negative")
+    return divmod(index, config.pairs_per_frame)
 
 
 def make_frame(
@@ -50,7 +57,7 @@ def make_frame(
     """All samples of a frame, from its first attempt that passes the checks.
 
     refused: why earlier attempts were, where that is known already.
-    FsidError after `ATTEMPTS` attempts that were refused.
+    FsidError after `ATTEMPTS` attempts that were refused, and for a negative seed or frame.
     """
     while len(refused) < ATTEMPTS:
         samples = Attempt(config, seed, frame, refused).samples(renderer)
