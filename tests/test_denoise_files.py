@@ -29,6 +29,7 @@ from fsid.sensor import (  # noqa: E402
     noisy_from_clean,
     read_raw,
     save_profile,
+    to_dn,
     write_dng,
 )
 from fsid.sensor.metadata import exposure_metadata  # noqa: E402
@@ -383,6 +384,29 @@ def test_files_in_subfolders_are_left_out_and_counted(
         assert line.startswith(f"note: files in folders inside {folder} are left out (2, the first one")
     main([*command, "--quiet"])
     assert capsys.readouterr().err == ""
+
+
+def test_files_of_the_other_kind_are_left_out_and_counted(
+    tmp_path: Path, network: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "in"
+    folder.mkdir()
+    for name in ("a", "b"):
+        write_dng(folder / f"{name}.dng", noisy_raw())
+        np.save(folder / f"bare-{name}.npy", to_dn(noisy_raw()))
+    layout = ["--cfa", "RGGB", "--black-level", "64", "--white-level", "1023"]
+    for options, first, advice in (
+        ([], f"files in {folder} that may be bare mosaics are left out (2, the first one", "with"),
+        (layout, f"RAW files in {folder} are left out (2, the first one", "without"),
+    ):
+        out = tmp_path / f"out-{advice}"
+        main(["denoise", str(folder), str(out), "--model", str(network), *options])
+        (line,) = (line for line in capsys.readouterr().err.splitlines() if "note:" in line)
+        assert line.startswith(f"note: {first}")
+        assert line.endswith(f"denoise them {advice} --cfa, --black-level and --white-level")
+        assert len(list(out.iterdir())) == 2
+        main(["denoise", str(folder), str(out), "--model", str(network), *options, "--quiet"])
+        assert capsys.readouterr().err == ""
 
 
 def test_noise_far_beyond_the_profile_is_said_once_per_run(

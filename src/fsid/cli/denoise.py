@@ -41,7 +41,7 @@ def denoise(
     Args:
         input: DNG or any other Bayer RAW that LibRaw opens; or a bare mosaic (.npy, 16-bit .png or .tif, .raw
             or .bin of 16-bit little-endian values), given --cfa, --black-level and --white-level; or a folder
-            of either (folders inside it are left out).
+            of either (folders inside it, and files of the other kind, are left out).
         output: DNG file to write (replaced if it is there), another than the input; a folder where the input
             is one.
         model: Folder of a training (fsid train), its model.safetensors, a file of fsid export (.onnx or
@@ -107,13 +107,18 @@ def denoise(
 
 
 def _note_left_out(folder: Path, output: Path, *, bare: bool) -> None:
-    """A line on the files in subfolders; an output that is one of them holds results."""
-    from fsid.denoise.files import raws_below
+    """A line on the files in subfolders (an `output` among them holds results), one on the other kind's."""
+    from fsid.denoise.files import raws_below, raws_inside
 
     below = [p for p in raws_below(folder, bare=bare) if output.resolve() not in p.resolve().parents]
-    if below:
-        line = f"note: files in folders inside {folder} are left out ({len(below)}, the first one {below[0]})"
-        Console(stderr=True).print(Text(f"{line}; give each folder by itself"), soft_wrap=True)
+    others = raws_inside(folder, bare=not bare)
+    kind = f"RAW files in {folder}" if bare else f"files in {folder} that may be bare mosaics"
+    how = f"denoise them {'without' if bare else 'with'} --cfa, --black-level and --white-level"
+    inside, each = f"files in folders inside {folder}", "give each folder by itself"
+    for what, left_out, advice in ((inside, below, each), (kind, others, how)):
+        if left_out:
+            line = f"note: {what} are left out ({len(left_out)}, the first one {left_out[0]}); {advice}"
+            Console(stderr=True).print(Text(line), soft_wrap=True)
 
 
 def _check_layout(layout: Layout, paths: Sequence[Path]) -> None:

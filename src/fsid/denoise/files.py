@@ -50,18 +50,22 @@ def find_raws(folder: str | Path, *, bare: bool = False) -> list[Path]:
     folder = Path(folder)
     if not folder.is_dir():
         raise FsidError(f"{folder}: is not a folder of RAW files")
-    try:
-        inside = sorted(path for path in folder.iterdir() if path.is_file())
-    except OSError as error:
-        raise FsidError(f"{folder}: cannot be read ({error.strerror})") from None
-    suffixes = _suffixes(bare)
-    raws = [p for p in inside if p.suffix.lower() in suffixes and not p.name.startswith(".")]
+    raws = raws_inside(folder, bare=bare)
     if not raws:
         what = "bare mosaic" if bare else "RAW file"
         below = raws_below(folder, bare=bare)
         where = f"; {below[0]} lies deeper, give its folder" if below else ""
-        raise FsidError(f"{folder}: holds no {what} ({', '.join(suffixes)}){where}")
+        raise FsidError(f"{folder}: holds no {what} ({', '.join(_suffixes(bare))}){where}")
     return raws
+
+
+def raws_inside(folder: Path, *, bare: bool = False) -> list[Path]:
+    """As `find_raws`, and none where there is none; FsidError where the folder cannot be read."""
+    try:
+        inside = sorted(path for path in folder.iterdir() if path.is_file())
+    except OSError as error:
+        raise FsidError(f"{folder}: cannot be read ({error.strerror})") from None
+    return [p for p in inside if p.suffix.lower() in _suffixes(bare) and not p.name.startswith(".")]
 
 
 def raws_below(folder: Path, *, bare: bool = False) -> list[Path]:
