@@ -127,6 +127,21 @@ def test_bad_input_is_one_line(tmp_path: Path, arguments: list[str], words: str,
     assert not (tmp_path / "out").exists()
 
 
+def test_unreadable_photographs_are_named_before_anything_is_written(photos: Path, tmp_path: Path, capsys):
+    for name in ("train", "test"):
+        shutil.copytree(photos, tmp_path / name)
+        (tmp_path / name / f"broken-{name}.jpg").write_bytes(b"no picture")
+    command = ["experiment", "real-vs-synthetic", "-o", str(tmp_path / "out"), *SMOKE]
+    with pytest.raises(SystemExit) as stop:
+        main([*command, "--photos", str(tmp_path / "train"), "--test", str(tmp_path / "test")])
+    assert stop.value.code == 2
+    told = " ".join(capsys.readouterr().err.split())
+    assert "2 of 8 pictures cannot be used" in told
+    assert "broken-train.jpg: cannot be read" in told
+    assert "broken-test.jpg: cannot be read" in told
+    assert not (tmp_path / "out").exists()
+
+
 def test_the_slider_of_a_report_moves_in_a_browser(photos: Path, tmp_path: Path):
     browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
     if browser is None:

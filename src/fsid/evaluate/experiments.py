@@ -11,6 +11,7 @@ weights, patches and noise; the data set of a source is one and the same, of the
 from __future__ import annotations
 
 import csv
+import os
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, fields
@@ -18,7 +19,7 @@ from pathlib import Path
 from typing import Literal
 
 from fsid.config import Override, load_settings
-from fsid.dataset import GenerateConfig, find_photos, find_pictures, generate
+from fsid.dataset import GenerateConfig, check_pictures, find_photos, find_pictures, generate
 from fsid.denoise import TrainConfig, train, train_config
 from fsid.errors import FsidError
 from fsid.evaluate.claim import claim
@@ -127,7 +128,7 @@ def experiment(out: Path, config: ExperimentConfig, bar: ProgressBar, *, workers
     Writes results.json (the rows of all test sets), images.csv and report.html. bar(label, unit): a context
     manager that yields progress(done, total).
     """
-    _check(out, config)
+    _check(out, config, bar, workers)
     claim(out, config, "experiment")
     testsets = _testsets(out, config, bar)
     rows, images = _measured(out / "baselines", [NOISY, CLASSICAL], testsets, bar)
@@ -149,18 +150,23 @@ def experiment(out: Path, config: ExperimentConfig, bar: ProgressBar, *, workers
     return write_experiment_report(out / "report.html", config, SOURCES[config.kind], rows, images)
 
 
-def _check(out: Path, config: ExperimentConfig) -> None:
+def _check(out: Path, config: ExperimentConfig, bar: ProgressBar, workers: int) -> None:
     """Refuse before anything is written what would stop the experiment on its way.
 
-    Its folder is taken once it has begun: the corrected command would be another experiment.
+    Its folder is taken once it has begun: the corrected command would be another experiment. Until then every
+    photograph is decoded, to see that it can be.
     """
     levels_of(load_bayer_profile(config.camera), TEST_ISOS, LUXES)
     _training(config, config.seeds[0])
     for source in SOURCES[config.kind]:
         _generator(out, config, source)
         _count(config, source)
-    for folder in config.tests:
-        find_photos(Path(folder))
+    pictures = [path for folder in config.tests for path in find_photos(Path(folder))]
+    if PHOTOGRAPHS in SOURCES[config.kind]:
+        pictures += find_pictures(Path(config.photos))
+    if pictures and not (out / "experiment.yaml").exists():
+        with bar("checking photographs", "pictures") as progress:
+            check_pictures(pictures, min(workers, os.cpu_count() or 1), progress)
 
 
 def _training(config: ExperimentConfig, seed: int) -> TrainConfig:
