@@ -127,6 +127,16 @@ def test_what_the_guides_promise_is_there(desk: Path):
     assert read_raw(desk / "mosaic.dng").cfa == "GBRG"
 
 
+def test_the_python_of_the_calibration_guide_runs(desk: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(desk)
+    text = (REPOSITORY / "docs" / "calibrate.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"```python\n(.*?)```", text, re.S)
+    exec(compile(block, "calibrate.md", "exec"), {})
+    profile, true = load_profile(desk / "arrays.yaml"), load_profile("galaxy-s22")
+    assert profile.iso == (800, 3200)
+    np.testing.assert_allclose(profile.k[1], true.level(3200).k, rtol=0.1)
+
+
 def test_the_readme_names_every_command_and_no_other():
     text = (REPOSITORY / "README.md").read_text(encoding="utf-8")
     named = set(re.findall(r"^\| `fsid ([a-z]+)", text, re.M))

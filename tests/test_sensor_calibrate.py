@@ -14,6 +14,7 @@ from fsid.sensor import (
     load_profile,
     noisy_from_clean,
     profile_names,
+    profile_of,
     save_profile,
     to_dn,
 )
@@ -57,6 +58,35 @@ def test_dark_frames_give_black_and_read_noise():
     sigma2_dn = np.array(PROFILE.level(3200).sigma2) * PROFILE.span**2
     np.testing.assert_allclose(fit.black, 64, atol=0.05)
     np.testing.assert_allclose(fit.sigma2_dn, sigma2_dn, rtol=0.03)
+
+
+def test_lines_of_arrays_make_a_profile(tmp_path):
+    rng = np.random.default_rng(7)
+    dark_scene = Raw(np.zeros((96, 96), np.float32), PROFILE.cfa, 64, 1023, (1, 1, 1), np.eye(3))
+    fits = {
+        iso: fit_noise(
+            [_burst(_gradient(96), iso, 20, rng)],
+            cfa=PROFILE.cfa,
+            white_level=1023,
+            dark=_burst(dark_scene, iso, 20, rng),
+        )
+        for iso in (3200, 800)
+    }
+    made = profile_of(fits, name="mine", cfa=PROFILE.cfa, white_level=1023, frames=(20, 20))
+    save_profile(tmp_path / "mine.yaml", made)
+    again = load_profile(tmp_path / "mine.yaml")
+    assert (again.iso, again.cfa, again.black_level, again.bits) == ((800, 3200), PROFILE.cfa, 64, 10)
+    assert again.measured.frames == (20, 20)
+    for iso in (800, 3200):
+        np.testing.assert_allclose(again.level(iso).k, PROFILE.level(iso).k, rtol=0.05)
+        np.testing.assert_allclose(again.level(iso).sigma2, PROFILE.level(iso).sigma2, rtol=0.1)
+    mono = fit_noise([_burst(_gradient(96), 800, 20, rng)], cfa=None, white_level=1023, black_level=64)
+    assert profile_of({800: mono}, name="m", cfa=None, white_level=1023, black_level=64).cfa == "MONO"
+    for wrong, words in (({}, "needs fits by ISO"), ({0: mono}, "needs fits by ISO")):
+        with pytest.raises(FsidError, match=words):
+            profile_of(wrong, name="m", cfa=None, white_level=1023)
+    with pytest.raises(FsidError, match="profile m"):
+        profile_of({800: mono}, name="m", cfa=None, white_level=60)
 
 
 def test_defective_and_clipped_pixels_do_not_count():

@@ -10,6 +10,7 @@ from fsid.sensor.demosaic import demosaic
 from fsid.sensor.develop import develop, develop_linear, upright
 from fsid.sensor.dng import dng_pixel_offset, read_raw, write_dng
 from fsid.sensor.exposure import expose, exposure_rand
+from fsid.sensor.fitted_profile import profile_of
 from fsid.sensor.light import LightLevel, dimmed, light_level
 from fsid.sensor.mosaic import bayer_crop, bayer_flip, mosaic, pack, unpack
 from fsid.sensor.noise import add_noise, level_rand, variance
@@ -72,6 +73,7 @@ __all__ = [
     "pack",
     "process",
     "profile_names",
+    "profile_of",
     "quantise",
     "read_mosaic",
     "read_raw",

@@ -18,8 +18,8 @@ import numpy as np
 
 from fsid.errors import FsidError
 from fsid.sensor.calibrate import NoiseFit, Samples, fit_samples, pool, pool_dark
-from fsid.sensor.camera_profile import MONO, CameraProfile, Measurement
-from fsid.sensor.colour import published_matrices
+from fsid.sensor.camera_profile import CameraProfile
+from fsid.sensor.fitted_profile import profile_of
 from fsid.sensor.frames import Frame, FrameSet, Layout, bursts, find_frames
 from fsid.sensor.temporal import TemporalStatistics
 from fsid.sensor.terms_fit import CUT_OFF, DarkFinding, dark_finding, fit_terms, prnu_of, shortest_dark
@@ -31,7 +31,6 @@ BLACK_DIFFERS = 0.01  # of the range, from which on dark frames contradict a bla
 BLACK_NOTED_DN = 1.0  # from which on it is noted, and from their own noise on
 BELOW_BLACK = 0.01  # of the pixels that may have a mean as far below the black level
 UNCERTAIN = 0.02  # relative standard error of k that deserves a note
-_METHOD = "fsid calibrate: weighted line through pooled temporal variances per CFA site (sensor/calibrate.py)"
 
 Progress = Callable[[int, int], None]
 _Pooled = tuple[Samples, ...]
@@ -68,7 +67,19 @@ def calibrate(
     isos = sorted({frame.iso for frame in found.frames})
     reader = _Reader(found, layout, progress)
     fits = [_fit_iso(reader, iso, tie_greens) for iso in isos]
-    profile = _profile(found, isos, fits, name, camera)
+    seen = found.camera
+    profile = profile_of(
+        dict(zip(isos, fits, strict=True)),
+        name=name,
+        cfa=seen.cfa,
+        white_level=seen.white_level,
+        black_level=seen.black_level,
+        camera=camera or seen.name or "unknown",
+        frames=[sum(frame.iso == iso for frame in found.frames) for iso in isos],
+        dark_frames=[sum(frame.iso == iso for frame in found.dark) for iso in isos],
+        date=found.date,
+        notes=". ".join(found.notes),
+    )
     if terms:
         k_dn = {iso: float(fit.k_dn.mean()) for iso, fit in zip(isos, fits, strict=True)}
         profile = replace(profile, terms=fit_terms(reader.dark, reader.prnu, k_dn))
@@ -251,46 +262,6 @@ def _notes(reader: _Reader, isos: Sequence[float], fits: Sequence[NoiseFit]) -> 
     for iso, fit in zip(isos, fits, strict=True):
         if (error := float(np.max(fit.k_dn_error / fit.k_dn))) > UNCERTAIN:
             yield f"ISO {iso:g}: k is uncertain by {100 * error:.1f} %; take more frames"
-
-
-def _profile(
-    found: FrameSet, isos: Sequence[float], fits: Sequence[NoiseFit], name: str, camera: str | None
-) -> CameraProfile:
-    seen = found.camera
-    black = seen.black_level
-    if black is None:
-        black = round(float(np.mean([fit.black for fit in fits])))
-    span = seen.white_level - black
-    frames, dark = (
-        tuple(sum(frame.iso == iso for frame in group) for iso in isos)
-        for group in (found.frames, found.dark)
-    )
-
-    def table(values: list[np.ndarray]) -> np.ndarray:
-        return np.array([np.broadcast_to(v, 4) for v in values])
-
-    return CameraProfile(
-        name=name,
-        camera=camera or seen.name or "unknown",
-        cfa=seen.cfa or MONO,
-        black_level=black,
-        white_level=seen.white_level,
-        bits=seen.white_level.bit_length(),
-        iso=tuple(isos),
-        k=table([fit.k_dn for fit in fits]) / span,
-        sigma2=table([fit.sigma2_dn for fit in fits]) / span**2,
-        xyz_to_camera=published_matrices(),
-        source=_METHOD,
-        notes=". ".join(found.notes),
-        date=found.date,
-        measured=Measurement(
-            k_error=table([fit.k_dn_error for fit in fits]) / span,
-            sigma2_error=table([fit.sigma2_dn_error for fit in fits]) / span**2,
-            black=table([fit.black for fit in fits]),
-            frames=frames,
-            dark_frames=dark,
-        ),
-    )
 
 
 def _per_site(black: float, cfa: str | None) -> np.ndarray:

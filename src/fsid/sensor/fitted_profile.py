@@ -1,0 +1,73 @@
+"""From fitted lines to a profile: DN to normalised units, one line per ISO.
+
+k = k_dn / span,      sigma2 = sigma2_dn / span^2,      span = white - black
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from fsid.errors import FsidError
+from fsid.sensor.calibrate import NoiseFit
+from fsid.sensor.camera_profile import MONO, CameraProfile, Measurement
+from fsid.sensor.colour import published_matrices
+from fsid.sensor.quantise import check_levels
+
+_METHOD = "fsid calibrate: weighted line through pooled temporal variances per CFA site (sensor/calibrate.py)"
+
+
+def profile_of(
+    fits: Mapping[float, NoiseFit],
+    *,
+    name: str,
+    cfa: str | None,
+    white_level: int,
+    black_level: int | None = None,
+    camera: str = "unknown",
+    frames: Sequence[int] = (),
+    dark_frames: Sequence[int] = (),
+    date: str = "",
+    notes: str = "",
+) -> CameraProfile:
+    """The profile `name` of the lines that `fit_noise` found, by ISO, for frames that no file holds.
+
+    cfa: None or "MONO" for a monochrome sensor. black_level: DN; the mean of the fits' where None. frames,
+    dark_frames: how many each line is from, in the order of the ISOs; 0 where not stated. FsidError: no fit,
+    an ISO that is none, or a white level not above the black level.
+    """
+    isos = sorted(fits)
+    if not isos or not all(0 < iso < math.inf for iso in isos):
+        raise FsidError(f"a profile needs fits by ISO, numbers above 0; got {isos}")
+    each = [fits[iso] for iso in isos]
+    black = round(float(np.mean([fit.black for fit in each]))) if black_level is None else black_level
+    check_levels(black, white_level, f"profile {name}")
+    span = white_level - black
+
+    def table(values: list[np.ndarray]) -> np.ndarray:
+        return np.array([np.broadcast_to(v, 4) for v in values])
+
+    return CameraProfile(
+        name=name,
+        camera=camera,
+        cfa=cfa or MONO,
+        black_level=black,
+        white_level=white_level,
+        bits=white_level.bit_length(),
+        iso=tuple(isos),
+        k=table([fit.k_dn for fit in each]) / span,
+        sigma2=table([fit.sigma2_dn for fit in each]) / span**2,
+        xyz_to_camera=published_matrices(),
+        source=_METHOD,
+        notes=notes,
+        date=date,
+        measured=Measurement(
+            k_error=table([fit.k_dn_error for fit in each]) / span,
+            sigma2_error=table([fit.sigma2_dn_error for fit in each]) / span**2,
+            black=table([fit.black for fit in each]),
+            frames=tuple(frames) or (0,) * len(isos),
+            dark_frames=tuple(dark_frames) or (0,) * len(isos),
+        ),
+    )
