@@ -256,6 +256,16 @@ def test_a_dataset_of_before_pictures_were_told_apart_goes_on(album: Path, tmp_p
         generate(out, config, count=2)
 
 
+def test_a_folder_of_pictures_may_move(album: Path, tmp_path: Path):
+    out, config = tmp_path / "out", small(f"images={album}")
+    generate(out, config, count=1)
+    moved = album.rename(tmp_path / "elsewhere")
+    assert generate(out, replace(config, images=str(moved)), count=2) == 2
+    (moved / "coffee-0.png").rename(moved / "coffee.png")
+    with pytest.raises(FsidError, match="already holds another dataset"):
+        generate(out, replace(config, images=str(moved)), count=3)
+
+
 def test_settings_made_in_python_are_those_of_a_file(tmp_path: Path):
     config = small("width=64", "height=48")
     loose = replace(config, width=np.int64(64), cameras=["pixel6"])

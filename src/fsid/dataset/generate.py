@@ -188,6 +188,8 @@ def is_begun(out: Path, dataset: DatasetConfig) -> bool:
         return False
     there = _used(from_plain(DatasetConfig, read_yaml(file), source=str(file)))
     here = _used(dataset if there.pictures_digest else replace(dataset, pictures_digest=""))
+    if there.pictures_digest and there.pictures_digest == here.pictures_digest:  # their folder may move
+        here = replace(here, generate=replace(here.generate, images=there.generate.images))
     if there == here or not (any(out.glob("shard-*.tar")) or any(out.glob("*.clean.dng"))):
         return there == here
     if there.generate == here.generate and there.seed == here.seed:
