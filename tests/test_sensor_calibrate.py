@@ -72,11 +72,11 @@ def test_lines_of_arrays_make_a_profile(tmp_path):
         )
         for iso in (3200, 800)
     }
-    made = profile_of(fits, name="mine", cfa=PROFILE.cfa, white_level=1023, frames=(20, 20))
+    made = profile_of(fits, name="mine", cfa=PROFILE.cfa, white_level=1023, frames={800: 20, 3200: 30})
     save_profile(tmp_path / "mine.yaml", made)
     again = load_profile(tmp_path / "mine.yaml")
     assert (again.iso, again.cfa, again.black_level, again.bits) == ((800, 3200), PROFILE.cfa, 64, 10)
-    assert again.measured.frames == (20, 20)
+    assert (again.measured.frames, again.measured.dark_frames) == ((20, 30), (0, 0))
     for iso in (800, 3200):
         np.testing.assert_allclose(again.level(iso).k, PROFILE.level(iso).k, rtol=0.05)
         np.testing.assert_allclose(again.level(iso).sigma2, PROFILE.level(iso).sigma2, rtol=0.1)

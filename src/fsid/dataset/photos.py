@@ -11,6 +11,7 @@ from PIL import ExifTags, Image
 from fsid.errors import FsidError
 from fsid.sensor import upright
 
+SMALLEST_PX = 32
 PHOTO_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".bmp")
 
 
@@ -48,8 +49,9 @@ def _read(path: str | Path, shrink: int = 1) -> np.ndarray:
     try:
         with Image.open(path) as image:
             width, height = image.size
-            if min(width, height) < 32:
-                raise FsidError(f"{path}: is {width}x{height} pixels, at least 32x32 are needed")
+            if min(width, height) < SMALLEST_PX:
+                needed = f"at least {SMALLEST_PX}x{SMALLEST_PX} are needed"
+                raise FsidError(f"{path}: is {width}x{height} pixels, {needed}")
             if shrink > 1:
                 image.draft(image.mode, (width // shrink, height // shrink))
             return _decoded(image)

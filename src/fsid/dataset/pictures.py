@@ -15,12 +15,11 @@ from pathlib import Path
 
 import numpy as np
 
-from fsid.dataset.photos import PHOTO_SUFFIXES, check_photo, files_inside, read_photo
+from fsid.dataset.photos import PHOTO_SUFFIXES, SMALLEST_PX, check_photo, files_inside, read_photo
 from fsid.errors import FsidError
 
 EXR_SUFFIX = ".exr"
 _SRGB_CHROMATICITIES = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
-_SMALLEST_PX = 32
 _NAMED = 5
 """So many unusable pictures are named."""
 _BEAUTY = "Combined"
@@ -119,7 +118,7 @@ def read_exr(path: Path) -> np.ndarray:
         raise FsidError(f"{path}: its channels differ in size (subsampled chroma); write plain R, G, B")
     pixels = np.stack(colours, axis=-1).astype(np.float32)
     height, width = (size // 2 * 2 for size in pixels.shape[:2])
-    if min(height, width) < _SMALLEST_PX:
+    if min(height, width) < SMALLEST_PX:
         raise FsidError(f"{path}: is {pixels.shape[1]}x{pixels.shape[0]} pixels, at least 32x32 are needed")
     if not np.isfinite(pixels).all():
         raise FsidError(f"{path}: holds NaN or infinite values; render it again")

@@ -15,8 +15,8 @@ bits as an undisturbed one.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
-from contextlib import nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -50,6 +50,18 @@ LAST_FILE = "last.safetensors"  # beside the best network, `MODEL_FILE`
 SELECTED = "psnr_scenes"  # which validation chooses the best network
 
 
+@contextmanager
+def _torch_as_it_was() -> Iterator[None]:
+    """PyTorch's number of threads and its random numbers on the CPU are afterwards what they were."""
+    threads = torch.get_num_threads()
+    try:
+        with torch.random.fork_rng(devices=()):
+            yield
+    finally:
+        torch.set_num_threads(threads)
+
+
+@_torch_as_it_was()
 def train(
     data_dir: str | Path,
     run_dir: str | Path,
@@ -69,23 +81,7 @@ def train(
     unusable data or settings, another run in `run_dir`, another process at work there, or a training that
     diverges. PyTorch's number of threads and its random numbers on the CPU are afterwards what they were.
     """
-    config, threads = as_read(config, source="config"), torch.get_num_threads()
-    try:
-        with torch.random.fork_rng(devices=()):
-            return _train(Path(data_dir), Path(run_dir), config, resume, quiet, command, progress)
-    finally:
-        torch.set_num_threads(threads)
-
-
-def _train(
-    data_dir: Path,
-    run_dir: Path,
-    config: TrainConfig,
-    resume: bool,
-    quiet: bool,
-    command: str,
-    progress: Callable[[int, int], None] | None,
-) -> Path:
+    data_dir, run_dir, config = Path(data_dir), Path(run_dir), as_read(config, source="config")
     if config.threads:
         torch.set_num_threads(config.threads)
     gpu = torch.cuda.is_available()

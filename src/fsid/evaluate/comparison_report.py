@@ -90,7 +90,7 @@ def _set_table(rows: Sequence[Row], set_name: str) -> Table:
     found = {(row.model, row.level): row for row in rows if row.set == set_name}
     methods, levels = (list(dict.fromkeys(key[i] for key in found)) for i in (0, 1))
     body = tuple(
-        (method_label(method), *(all_metrics(found[method, level]) for level in levels)) for method in methods
+        (method_label(method), *(_figures(found[method, level]) for level in levels)) for method in methods
     )
     best = {
         (i, j)
@@ -103,7 +103,7 @@ def _set_table(rows: Sequence[Row], set_name: str) -> Table:
     return Table(title, ("", *map(level_label, levels)), body, frozenset(best))
 
 
-def all_metrics(row: Row) -> str:
+def _figures(row: Row) -> str:
     """RAW PSNR / PSNR / SSIM of a row."""
     return " / ".join(f"{getattr(row, key):{form}}" for key, _, form in METRICS)
 

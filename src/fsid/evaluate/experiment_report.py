@@ -9,7 +9,7 @@ sign in two seeds is real.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -125,29 +125,42 @@ def _set_label(name: str) -> str:
 
 def _standing(results: _Results, names: Sequence[str]) -> Section:
     """The gaps of all sets, a table per rival and metric."""
-    tables = []
-    for rival in results.rivals:
-        for metric, title, _ in DECIBELS:
-            body = []
-            for name in names:
-                gap = results.gap(rival, name, metric)
-                lowest = int(gap.argmin())
-                body.append(
-                    (
-                        _set_label(name),
-                        f"{gap.mean():+.2f}",
-                        f"{gap[lowest]:+.2f} ({level_label(results.levels[name][lowest])})",
-                        " ".join(f"{m:+.2f}" for m in results.medians(rival, name, metric).mean(0)),
-                    )
-                )
-            head = ("", "mean", "lowest level", "paired medians")
-            tables.append(Table(f"full - {rival}, {title}", head, tuple(body)))
+
+    def cells(rival: str, name: str, metric: str) -> tuple[str, ...]:
+        gap = results.gap(rival, name, metric)
+        lowest = int(gap.argmin())
+        medians = results.medians(rival, name, metric).mean(0)
+        return (
+            f"{gap.mean():+.2f}",
+            f"{gap[lowest]:+.2f} ({level_label(results.levels[name][lowest])})",
+            " ".join(f"{m:+.2f}" for m in medians),
+        )
+
+    tables = _gap_tables(results, names, ("mean", "lowest level", "paired medians"), cells)
     text = (
         "What the network gains that was trained on the full variant of the scenes. Mean: over images, seeds "
         "and levels. Paired medians: of the differences image by image, mean of levels, one figure per seed. "
         "Below 0.05 dB a gap is nothing; 0.10 dB with the same sign in two seeds is real."
     )
-    return Section("Where the full variant stands", text, tuple(tables))
+    return Section("Where the full variant stands", text, tables)
+
+
+def _gap_tables(
+    results: _Results,
+    names: Sequence[str],
+    head: Sequence[str],
+    cells: Callable[[str, str, str], tuple[str, ...]],
+) -> tuple[Table, ...]:
+    """A table per rival and metric in dB, a row per set; cells(rival, set, metric) of a row."""
+    return tuple(
+        Table(
+            f"full - {rival}, {title}",
+            ("", *head),
+            tuple((_set_label(name), *cells(rival, name, metric)) for name in names),
+        )
+        for rival in results.rivals
+        for metric, title, _ in DECIBELS
+    )
 
 
 def _of_set(results: _Results, name: str, kind: str) -> Section:
@@ -183,18 +196,14 @@ def _of_set(results: _Results, name: str, kind: str) -> Section:
 
 def _by_material(results: _Results, names: Sequence[str]) -> Section:
     """The gaps of single materials, a table per rival and metric."""
-    levels = results.levels[names[0]]
-    tables = []
-    for rival in results.rivals:
-        for metric, title, _ in DECIBELS:
-            body = []
-            for name in names:
-                gap = results.gap(rival, name, metric)
-                body.append((name, *(f"{g:+.2f}" for g in gap), f"{gap.mean():+.2f}"))
-            head = ("", *map(level_label, levels), "mean")
-            tables.append(Table(f"full - {rival}, {title}", head, tuple(body)))
+
+    def cells(rival: str, name: str, metric: str) -> tuple[str, ...]:
+        gap = results.gap(rival, name, metric)
+        return (*(f"{g:+.2f}" for g in gap), f"{gap.mean():+.2f}")
+
+    head = (*map(level_label, results.levels[names[0]]), "mean")
     text = "Gaps by material, means over images and seeds. What each source comes to is in results.json."
-    return Section("By material", text, tuple(tables))
+    return Section("By material", text, _gap_tables(results, names, head, cells))
 
 
 def _gap_plot(results: _Results, name: str) -> Figure:

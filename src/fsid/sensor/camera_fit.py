@@ -10,6 +10,7 @@ light to the noise. What was found and left out on the way is said in `Calibrati
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -75,8 +76,8 @@ def calibrate(
         white_level=seen.white_level,
         black_level=seen.black_level,
         camera=camera or seen.name or "unknown",
-        frames=[sum(frame.iso == iso for frame in found.frames) for iso in isos],
-        dark_frames=[sum(frame.iso == iso for frame in found.dark) for iso in isos],
+        frames=Counter(frame.iso for frame in found.frames),
+        dark_frames=Counter(frame.iso for frame in found.dark),
         date=found.date,
         notes=". ".join(found.notes),
     )

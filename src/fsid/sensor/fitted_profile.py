@@ -6,7 +6,7 @@ k = k_dn / span,      sigma2 = sigma2_dn / span^2,      span = white - black
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -27,15 +27,15 @@ def profile_of(
     white_level: int,
     black_level: int | None = None,
     camera: str = "unknown",
-    frames: Sequence[int] = (),
-    dark_frames: Sequence[int] = (),
+    frames: Mapping[float, int] | None = None,
+    dark_frames: Mapping[float, int] | None = None,
     date: str = "",
     notes: str = "",
 ) -> CameraProfile:
     """The profile `name` of the lines that `fit_noise` found, by ISO, for frames that no file holds.
 
     cfa: None or "MONO" for a monochrome sensor. black_level: DN; the mean of the fits' where None. frames,
-    dark_frames: how many each line is from, in the order of the ISOs; 0 where not stated. FsidError: no fit,
+    dark_frames: how many the lines are from, by ISO; 0 where not stated. FsidError: no fit,
     an ISO that is none, or a white level not above the black level.
     """
     isos = sorted(fits)
@@ -67,7 +67,7 @@ def profile_of(
             k_error=table([fit.k_dn_error for fit in each]) / span,
             sigma2_error=table([fit.sigma2_dn_error for fit in each]) / span**2,
             black=table([fit.black for fit in each]),
-            frames=tuple(frames) or (0,) * len(isos),
-            dark_frames=tuple(dark_frames) or (0,) * len(isos),
+            frames=tuple((frames or {}).get(iso, 0) for iso in isos),
+            dark_frames=tuple((dark_frames or {}).get(iso, 0) for iso in isos),
         ),
     )

@@ -17,7 +17,7 @@ import numpy as np
 
 from fsid.errors import FsidError
 from fsid.sensor.arrays import namespace
-from fsid.sensor.raw import CFA_PATTERNS, Raw
+from fsid.sensor.raw import CFA_PATTERNS, Raw, check_even
 
 SITES = ("R", "Gr", "Gb", "B")
 SITE_CHANNEL = (0, 1, 1, 2)  # RGB channel of each packed site
@@ -95,9 +95,3 @@ def bayer_flip(raw: Raw, vertical: bool, horizontal: bool) -> Raw:
     return replace(
         raw, mosaic=np.ascontiguousarray(flipped), cfa=cfa, metadata=raw.metadata.without_geometry()
     )
-
-
-def check_even(shape: tuple[int, ...]) -> None:
-    """FsidError unless `shape` is (H, W) of whole 2x2 tiles."""
-    if len(shape) != 2 or shape[0] % 2 or shape[1] % 2 or 0 in shape:
-        raise FsidError(f"a Bayer image has an even height and width; got shape {shape}: crop it first")

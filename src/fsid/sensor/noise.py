@@ -19,10 +19,10 @@ import numpy as np
 from fsid.errors import FsidError
 from fsid.sensor.formula import noise_variance, with_noise
 from fsid.sensor.gaussian import standard_normal
-from fsid.sensor.mosaic import check_even, site_offsets
+from fsid.sensor.mosaic import site_offsets
 from fsid.sensor.profiles import CameraProfile
 from fsid.sensor.quantise import ROUNDING_DN2
-from fsid.sensor.raw import NoiseLevel, Raw
+from fsid.sensor.raw import NoiseLevel, Raw, check_even
 
 K_JITTER = 0.05  # relative sigma: conversion gain from unit to unit, and vendors' rounding of ISO
 _BLOCK_PIXELS = 1 << 17
@@ -49,11 +49,10 @@ def variance(x: np.ndarray, level: NoiseLevel, cfa: str | None = None) -> np.nda
 def add_noise(rng: np.random.Generator, raw: Raw, level: NoiseLevel) -> Raw:
     """One exposure of the clean `raw`: its mosaic plus noise of `level`, which the result carries.
 
-    Values may fall below 0 and above 1; `quantise` stores them as the camera would. FsidError for an odd
-    height or width, and a level that is none.
+    Values may fall below 0 and above 1; `quantise` stores them as the camera would. FsidError for a level
+    that is none.
     """
     level.check()
-    check_even(raw.mosaic.shape)
     height, width = raw.mosaic.shape
     rows = _rows(level, raw.cfa, width)
     noisy = np.empty((height // 2, 2, width), np.float32)

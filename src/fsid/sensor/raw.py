@@ -63,8 +63,12 @@ class Raw:
     metadata: Metadata = Metadata()  # noqa: RUF009  frozen
 
     def __post_init__(self) -> None:
-        shape = self.mosaic.shape
-        if len(shape) != 2 or shape[0] % 2 or shape[1] % 2 or 0 in shape:
-            raise FsidError(f"a Bayer image has an even height and width; got shape {shape}: crop it first")
+        check_even(self.mosaic.shape)
         if isinstance(self.mosaic, np.ndarray) and self.mosaic.dtype.kind != "f":
             raise FsidError(f"the mosaic holds {self.mosaic.dtype}; give x = (DN - black) / (white - black)")
+
+
+def check_even(shape: tuple[int, ...]) -> None:
+    """FsidError unless `shape` is (H, W) of whole 2x2 tiles."""
+    if len(shape) != 2 or shape[0] % 2 or shape[1] % 2 or 0 in shape:
+        raise FsidError(f"a Bayer image has an even height and width; got shape {shape}: crop it first")
