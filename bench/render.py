@@ -10,16 +10,23 @@ room, three shadowed point and spot lights, 20 materials without clearcoat, shee
 --fidelity compares both qualities with 4 x 4 samples per pixel (PSNR of the radiance, scaled so that its
 97th percentile is white, at 480x270). --triangles draws one scene with meshes divided into ever more
 triangles. Memory over many scenes: bench/dataset.py --only memory.
+
+--workers 1 4 16 counts the frames that so many processes make together in --seconds at 1920x1080: every frame
+another scene, sampled, built, drawn and read back. Each worker draws --frames scenes before the clock starts;
+texels of materials come from the cache on disk where they are neither resident nor new.
 """
 
 from __future__ import annotations
 
 import argparse
 import itertools
+import multiprocessing
+import os
 import resource
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from threading import Barrier
 
 import numpy as np
 
@@ -44,7 +51,14 @@ def main() -> None:
     parser.add_argument("--plain", action="store_true", help="plain scenes of three lights, 20 materials")
     parser.add_argument("--fidelity", action="store_true", help="compare the qualities instead")
     parser.add_argument("--triangles", action="store_true", help="cost over triangles instead")
+    parser.add_argument("--fragments", action="store_true", help="shade in fragment shaders on a GPU, too")
+    parser.add_argument(
+        "--workers", type=int, nargs="+", help="frames per second of so many processes instead"
+    )
+    parser.add_argument("--seconds", type=float, default=20.0, help="how long --workers are timed")
     options = parser.parse_args()
+    if options.workers:
+        return throughput(options)
     if options.fidelity:
         return fidelity(options)
     with open_renderer(options, options.quality) as renderer:
@@ -60,10 +74,15 @@ def open_renderer(options: argparse.Namespace, quality: str, supersampling: int 
         device_index=options.device,
         quality=quality,
         supersampling=supersampling,
+        compute=False if options.fragments else None,
     )
 
 
 def scenes_of(count: int, width: int, height: int, *, plain: bool = False) -> list[Scene]:
+    return [scene_of(seed, width, height, plain=plain) for seed in range(count)]
+
+
+def scene_of(seed: int, width: int, height: int, *, plain: bool) -> Scene:
     config = SceneConfig(objects=(40, 40))
     if plain:
         config = replace(
@@ -81,8 +100,8 @@ def scenes_of(count: int, width: int, height: int, *, plain: bool = False) -> li
                 contrast_blue=(0.0, 0.0),
             ),
         )
-    scenes = [sample(config, seed, width=width, height=height) for seed in range(count)]
-    return [of_few_materials(scene, 20) for scene in scenes] if plain else scenes
+    scene = sample(config, seed, width=width, height=height)
+    return of_few_materials(scene, 20) if plain else scene
 
 
 def of_few_materials(scene: Scene, count: int) -> Scene:
@@ -90,6 +109,39 @@ def of_few_materials(scene: Scene, count: int) -> Scene:
     few = [material for materials in scene.materials for material in materials][:count]
     turn = itertools.cycle(few)
     return replace(scene, materials=tuple(tuple(next(turn) for _ in each) for each in scene.materials))
+
+
+def throughput(options: argparse.Namespace) -> None:
+    """Frames per second of several processes that share the device and the processor."""
+    context = multiprocessing.get_context("spawn")
+    for count in options.workers:
+        os.environ.update(dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"), LP_NUM_THREADS="0")
+        with context.Manager() as manager, context.Pool(count) as pool:
+            ready = manager.Barrier(count)
+            turns = [pool.apply_async(frames_in, (options, worker, ready)) for worker in range(count)]
+            rates, cpu = np.array([turn.get() for turn in turns]).T
+        print(
+            f"{count:>3} workers {rates.sum():7.2f} frames/s of {SIZES[-1][0]}x{SIZES[-1][1]}, "
+            f"{cpu.mean():.3f} cpu s a frame"
+        )
+
+
+def frames_in(options: argparse.Namespace, worker: int, ready: Barrier) -> tuple[float, float]:
+    """Frames per second of one worker, and processor seconds of a frame."""
+    seeds = itertools.count(worker * 100_000)
+    with open_renderer(options, options.quality) as renderer:
+
+        def draw_next() -> None:
+            renderer.radiance(scene_of(next(seeds), *SIZES[-1], plain=options.plain))
+
+        for _ in range(options.frames):
+            draw_next()
+        ready.wait()
+        start, cpu, done = time.perf_counter(), time.process_time(), 0
+        while time.perf_counter() - start < options.seconds:
+            draw_next()
+            done += 1
+        return done / (time.perf_counter() - start), (time.process_time() - cpu) / done
 
 
 def frames(renderer: Renderer, options: argparse.Namespace) -> None:

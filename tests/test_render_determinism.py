@@ -171,7 +171,7 @@ with Renderer(texture_size=64) as renderer:
     for count in (4, 12):
         for _ in range(count):
             frame = renderer.render(drawn)
-        renderer._drain.run()
+        renderer._drain()
         print(held_bytes())
     for layers in (1000, 1100):
         renderer._layers._grow(layers)

@@ -58,12 +58,6 @@ class Buffers:
         array.render_indirect(buffer, moderngl.TRIANGLES, count=len(commands))
         self._owned.append(buffer)
 
-    def draw_screen(self, program: moderngl.Program) -> None:
-        """Every pixel of the bound target once."""
-        array = self._context.vertex_array(program, [])
-        array.render(moderngl.TRIANGLES, vertices=3)
-        self._owned.append(array)
-
     def release(self) -> None:
         """Free all of it."""
         for item in self._owned:

@@ -15,6 +15,9 @@ from fsid.render.texture_array import TextureArray
 BUDGET_BYTES = 224 * 2**20
 """Texture memory: 21 layers of 1024 texels, four times as many of 512."""
 
+GPU_BUDGET_BYTES = 2**30
+"""What may stay resident on a GPU, which several renderers may share; scenes have the same texels there."""
+
 MOST_LAYERS = 480
 """Resident at most, however small they are: those of five crowded scenes. 95 % of what later scenes need is
 among them; of four times as many it was 97 % (docs/results.md)."""
@@ -58,7 +61,8 @@ class LayerStore:
         drain: Callable[[], None] | None = None,
         budget_bytes: int = BUDGET_BYTES,
     ) -> None:
-        """drain: called before arrays are freed, so that the driver does not hold them (`Drain.run`)."""
+        """drain: called before arrays are freed, so that the driver does not hold them (`Drain.run`).
+        budget_bytes: of what stays resident."""
         self._context = context
         self._drain = drain or context.finish
         self._size = size

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import moderngl
 import numpy as np
 
-from fsid.render.buffers import Buffers
 from fsid.render.exposure import Shot
-from fsid.render.programs import load_program, set_uniforms
+from fsid.render.programs import ScreenProgram
 from fsid.render.targets import Targets
 
 WIDTH = 64
@@ -32,14 +31,13 @@ class OverviewPass:
     """Draws the places; reads them when asked, so that other passes can be issued in between."""
 
     def __init__(self, context: moderngl.Context) -> None:
-        self._context = context
-        self._program = load_program(context, "screen.vert", "overview.frag")
+        self._program = ScreenProgram(context, "overview.frag", compute=False)
 
-    def draw(self, targets: Targets, buffers: Buffers) -> None:
+    def draw(self, targets: Targets) -> None:
         """The places of an image whose G-buffer is drawn."""
-        self._context.enable_only(moderngl.NOTHING)
-        set_uniforms(self._program, places=targets.begin_overview(WIDTH))
-        buffers.draw_screen(self._program)
+        canvas = targets.begin_overview(WIDTH)
+        self._program.set(places=canvas.size)
+        self._program.draw(canvas)
 
     def read(self, targets: Targets, shot: Shot) -> Overview:
         """What was drawn; waits for it."""

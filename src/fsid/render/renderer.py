@@ -32,7 +32,7 @@ from fsid.render.exposure import Shot, is_moving, shots_of
 from fsid.render.flow import flow_between
 from fsid.render.frame import Frame
 from fsid.render.fringes import inside, magnified, with_margin
-from fsid.render.layers import Layer, LayerStore, fitting_size
+from fsid.render.layers import BUDGET_BYTES, GPU_BUDGET_BYTES, Layer, LayerStore, fitting_size
 from fsid.render.mirror import MOST, Mirror, clearest_mirror, ground_mirror
 from fsid.render.occlusion_pass import OcclusionPass
 from fsid.render.overview import OverviewPass
@@ -58,7 +58,8 @@ class Renderer:
     where a scene has more materials than texture memory is meant for (`fsid.render.layers.BUDGET_BYTES`).
     quality: "high", or "fast" with fewer taps and coarser shadow maps (docs/render.md has both measured).
     lens_images: at most so many images, seen from places on the lens, make one with depth of field; each is
-    blurred by its depth for the part of the lens that it stands for.
+    blurred by its depth for the part of the lens that it stands for. compute: shade in compute shaders
+    instead of fragment shaders; None does so on a GPU. Both make the same image to rounding.
     Raises FsidError where OpenGL 4.3 is missing or a second Renderer is opened in one process. The thread
     that opens it is the one that renders: OpenGL knows a context in one thread only.
     """
@@ -73,6 +74,7 @@ class Renderer:
         texture_size: int = 1024,
         quality: str = "high",
         lens_images: int = 1,
+        compute: bool | None = None,
     ) -> None:
         if Renderer._active is not None:
             raise FsidError(
@@ -94,26 +96,27 @@ class Renderer:
         self._thread = threading.get_ident()
         Renderer._active = self
         try:
-            self._prepare(texture_size)
+            self._on_gpu = not self.info.is_software
+            self._prepare(texture_size, self._on_gpu if compute is None else compute)
         except BaseException:
             self.close()
             raise
 
-    def _prepare(self, texture_size: int) -> None:
+    def _prepare(self, texture_size: int, compute: bool) -> None:
         context, quality, grid = self._context, self._quality, self._grid
         self._texture_size = texture_size
-        self._drain = Drain(context)
-        self._layers = LayerStore(context, texture_size, self._drain.run)
-        self._targets = Targets(context, grid)
-        self._mirror_targets = [Targets(context, grid) for _ in range(MOST)]
+        self._drain = context.finish if self._on_gpu else Drain(context).run
+        self._layers = self._new_layers(texture_size)
+        self._targets = Targets(context, grid, compute=compute)
+        self._mirror_targets = [Targets(context, grid, compute=compute) for _ in range(MOST)]
         table = tap_table(quality)
         self._taps = context.texture((table.shape[1], table.shape[0]), 2, table.tobytes(), dtype="f4")
         self._taps.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        self._shadows = ShadowPass(context, quality, grid, self._taps, self._drain.run)
+        self._shadows = ShadowPass(context, quality, grid, self._taps, self._drain, compute=compute)
         self._samples = SamplePass(context)
         self._overview = OverviewPass(context)
-        self._occlusion = OcclusionPass(context, quality, grid, self._taps)
-        self._shade = ShadePass(context, quality, grid, self._shadows)
+        self._occlusion = OcclusionPass(context, quality, grid, self._taps, compute=compute)
+        self._shade = ShadePass(context, quality, grid, self._shadows, compute=compute)
 
     @property
     def _label_sample(self) -> float:
@@ -227,8 +230,8 @@ class Renderer:
             # Shadows come third: a CPU makes their triangles ready while it draws the first two.
             self._samples.draw(self._targets, stage, buffers, shot)
             mark("samples")
-            self._overview.draw(self._targets, buffers)
-            self._occlusion.draw(self._targets, buffers, shot)
+            self._overview.draw(self._targets)
+            self._occlusion.draw(self._targets, shot)
             mark("occlusion")
             mirrors = self._mirrors(view, shot, layers)
             self._shadows.draw(stage, buffers, [shot, *(mirror.shot for mirror in mirrors)])
@@ -251,8 +254,13 @@ class Renderer:
         size = fitting_size(self._texture_size, len(wanted))
         if size != self._layers.size:
             self._layers.release()
-            self._layers = LayerStore(self._context, size, self._drain.run)
+            self._layers = self._new_layers(size)
         return self._layers.load(wanted, bake)
+
+    def _new_layers(self, size: int) -> LayerStore:
+        return LayerStore(
+            self._context, size, self._drain, GPU_BUDGET_BYTES if self._on_gpu else BUDGET_BYTES
+        )
 
     def _mirrors(self, view: View, shot: Shot, layers: dict[tuple[str, int], Layer]) -> list[Mirror]:
         """The flat smooth surfaces that show images, from the G-buffer."""
@@ -267,7 +275,7 @@ class Renderer:
         camera = replace(stage.view.camera, width=size[0], vignetting=ZERO)
         stage = replace(stage, view=replace(stage.view, camera=camera))
         self._samples.draw(targets, stage, buffers, shot, kept=mirror.kept)
-        self._occlusion.draw(targets, buffers, shot)
+        self._occlusion.draw(targets, shot)
         self._shadows.draw_blocks(targets, stage, buffers, shot)
         self._shade.draw(targets, stage, buffers, shot, self._layers, shining=False)
 

@@ -16,9 +16,10 @@ import moderngl
 import numpy as np
 
 from fsid.render.buffers import Buffers
+from fsid.render.canvas import Canvas
 from fsid.render.exposure import Shot
 from fsid.render.layers import LayerStore
-from fsid.render.programs import load_program, set_uniforms
+from fsid.render.programs import ScreenProgram
 from fsid.render.quality import Quality
 from fsid.render.reflectance import lobe_table, reflectance_table
 from fsid.render.shadow_pass import ShadowPass
@@ -27,15 +28,18 @@ from fsid.render.targets import Targets
 
 
 class ShadePass:
-    """Owns the programs and the table of what GGX reflects. grid: as in `Targets`."""
+    """Owns the programs and the table of what GGX reflects. grid, compute: as in `Targets`."""
 
-    def __init__(self, context: moderngl.Context, quality: Quality, grid: int, shadows: ShadowPass) -> None:
+    def __init__(
+        self, context: moderngl.Context, quality: Quality, grid: int, shadows: ShadowPass, *, compute: bool
+    ) -> None:
         self._context = context
+        self._compute = compute
         self._quality = quality
         self._grid = grid
         self._shadows = shadows
-        self._programs: dict[tuple[object, ...], moderngl.Program] = {}
-        self._copy = load_program(context, "screen.vert", "copy_result.frag")
+        self._programs: dict[tuple[object, ...], ScreenProgram] = {}
+        self._copy = ScreenProgram(context, "copy_result.frag", compute=compute, marks=2)
         shares = reflectance_table()
         table = np.concatenate([np.pad(shares, ((0, 0), (0, 0), (0, 1))), lobe_table()])
         self._reflectance = context.texture(table.shape[1::-1], 4, table.tobytes(), dtype="f4")
@@ -54,54 +58,33 @@ class ShadePass:
     ) -> None:
         """Everything but glass. mirrors: planes, and the images that they show. shining: whether what emits
         light is seen to."""
-        targets.begin_shading()
         for i, (_, image) in enumerate(mirrors):
             image.use_mirror(11 + i)
-        context, planar = self._context, len(mirrors)
         planes = np.array([plane for plane, _ in mirrors])
-
-        def draw_part(own: int) -> None:
-            program = self._shading(shot.lens.model, stage, GLASS=0, PLANAR=planar, OWN=own)
-            set_uniforms(
-                program, block_lights=targets.block_lights, shining=float(shining), mirror_planes=planes
+        for own, canvas in enumerate((targets.begin_shading(), targets.begin_missing())):
+            program = self._shading(
+                shot.lens.model, stage, marks=1 + own, adds=own == 1, GLASS=0, PLANAR=len(mirrors), OWN=own
             )
-            self._shade(program, targets, stage, buffers, shot, layers)
-
-        context.enable_only(moderngl.DEPTH_TEST)
-        context.depth_func = "1"  # always: what is drawn is a mark
-        draw_part(0)
-        targets.begin_missing()
-        context.enable(moderngl.BLEND)
-        context.blend_func = moderngl.ONE, moderngl.ONE
-        context.depth_func = ">"
-        draw_part(1)
-        context.depth_func = "<"
-        context.enable_only(moderngl.NOTHING)
+            program.set(block_lights=targets.block_lights, shining=float(shining), mirror_planes=planes)
+            self._shade(program, canvas, targets, stage, buffers, shot, layers)
 
     def draw_glass(
         self, targets: Targets, stage: Stage, buffers: Buffers, shot: Shot, layers: LayerStore
     ) -> None:
         """Glass over the result so far."""
-        context, lens = self._context, shot.lens.model
-        marks = self._program("glass_marks.frag", LENS=lens)
+        lens = shot.lens.model
+        marks = self._program("glass_marks.frag", marks=1, LENS=lens)
         _set_view(marks, targets, shot)
-        context.enable_only(moderngl.DEPTH_TEST)
-        context.depth_func = "1"
-        targets.begin_marks()
-        buffers.draw_screen(marks)
-        context.depth_func = ">"
-        targets.begin_glass()
-        program = self._shading(lens, stage, GLASS=1, PLANAR=0, OWN=2)
-        set_uniforms(program, block_lights=0, shining=1.0)
-        self._shade(program, targets, stage, buffers, shot, layers)
-        targets.end_glass()
-        buffers.draw_screen(self._copy)
-        context.depth_func = "<"
-        context.enable_only(moderngl.NOTHING)
+        marks.draw(targets.begin_marks())
+        program = self._shading(lens, stage, marks=2, GLASS=1, PLANAR=0, OWN=2)
+        program.set(block_lights=0, shining=1.0)
+        self._shade(program, targets.begin_glass(), targets, stage, buffers, shot, layers)
+        self._copy.draw(targets.end_glass())
 
     def _shade(
         self,
-        program: moderngl.Program,
+        program: ScreenProgram,
+        canvas: Canvas,
         targets: Targets,
         stage: Stage,
         buffers: Buffers,
@@ -111,8 +94,7 @@ class ShadePass:
         _set_view(program, targets, shot)
         _set_surroundings(program, stage, shot)
         camera = stage.view.camera
-        set_uniforms(
-            program,
+        program.set(
             light_count=stage.plan.light_count,
             max_probes=self._quality.probes,
             vignetting=camera.vignetting,
@@ -121,25 +103,34 @@ class ShadePass:
         self._shadows.use(program, stage.plan)
         self._reflectance.use(14)
         buffers.use()
-        buffers.draw_screen(program)
+        program.draw(canvas)
 
-    def _shading(self, lens_model: int, stage: Stage, **defines: int) -> moderngl.Program:
+    def _shading(
+        self, lens_model: int, stage: Stage, *, marks: int, adds: bool = False, **defines: int
+    ) -> ScreenProgram:
         lobes, areas = int(stage.has_lobes), int(stage.has_areas)
-        return self._program("shade.frag", LENS=lens_model, LOBES=lobes, AREAS=areas, **defines)
+        return self._program(
+            "shade.frag", marks=marks, adds=adds, LENS=lens_model, LOBES=lobes, AREAS=areas, **defines
+        )
 
-    def _program(self, fragment: str, **defines: int) -> moderngl.Program:
-        key = (fragment, *defines.items())
+    def _program(self, source: str, *, marks: int, adds: bool = False, **defines: int) -> ScreenProgram:
+        key = (source, marks, adds, *defines.items())
         if key not in self._programs:
-            self._programs[key] = load_program(
-                self._context, "screen.vert", fragment, GRID=self._grid, **defines
+            self._programs[key] = ScreenProgram(
+                self._context,
+                source,
+                compute=self._compute,
+                marks=marks,
+                adds=adds,
+                GRID=self._grid,
+                **defines,
             )
         return self._programs[key]
 
 
-def _set_view(program: moderngl.Program, targets: Targets, shot: Shot) -> None:
+def _set_view(program: ScreenProgram, targets: Targets, shot: Shot) -> None:
     lens = shot.lens
-    set_uniforms(
-        program,
+    program.set(
         size=targets.size,
         seen=targets.seen,
         focal=lens.focal,
@@ -153,10 +144,9 @@ def _set_view(program: moderngl.Program, targets: Targets, shot: Shot) -> None:
     )
 
 
-def _set_surroundings(program: moderngl.Program, stage: Stage, shot: Shot) -> None:
+def _set_surroundings(program: ScreenProgram, stage: Stage, shot: Shot) -> None:
     room, sky, pixel_rad = stage.room, stage.sky, 2.0 / (shot.lens.focal[0] * stage.view.camera.width)
-    set_uniforms(
-        program,
+    program.set(
         ambient_sides=room.sides,
         mean_sides=room.radiance.mean((1, 2)),
         room_half=room.half_m,

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import moderngl
+
+from fsid.render.canvas import Canvas
 
 
 class ShadowAtlas:
@@ -35,7 +37,7 @@ class ShadowAtlas:
         self._depth.repeat_x = self._depth.repeat_y = False
         self._moments = self._context.texture((size[0] // 2, size[1] // 2), 2, dtype="f4")
         self.framebuffer = self._context.framebuffer([], self._depth)
-        self._to_moments: Any = self._context.framebuffer([self._moments])
+        self._to_moments = Canvas(self._context, [self._moments])
         self._owned = [self.framebuffer, self._to_moments, self._depth, self._moments]
         self._size = size
 
@@ -45,16 +47,13 @@ class ShadowAtlas:
         self.framebuffer.viewport = (0, 0, *self._size)
         self.framebuffer.clear(depth=1.0)
 
-    def draw_moments(
-        self, corners: Sequence[tuple[int, int]], tile_px: int, draw_screen: Callable[[], None]
-    ) -> None:
-        """The moments of tiles, with mip levels, from the depth, which unit 0 holds."""
+    def begin_moments(self) -> Canvas:
+        """Draw moments, of half the size, from the depth, which unit 0 holds."""
         self._depth.use(0)
-        for x, y in corners:
-            self._to_moments.scissor = (x // 2, y // 2, tile_px // 2, tile_px // 2)
-            self._to_moments.use()
-            draw_screen()
-        self._to_moments.scissor = None
+        return self._to_moments
+
+    def end_moments(self) -> None:
+        """Make their mip levels."""
         self._moments.build_mipmaps()
 
     def use(self, compare_unit: int, moments_unit: int) -> None:

@@ -12,7 +12,7 @@ from fsid.render.buffers import Buffers
 from fsid.render.exposure import Shot
 from fsid.render.frustum import in_view, sees
 from fsid.render.geometry import draw_commands
-from fsid.render.programs import load_program, set_uniforms
+from fsid.render.programs import ScreenProgram, load_program, set_uniforms
 from fsid.render.quality import Quality
 from fsid.render.shadow_atlas import ShadowAtlas
 from fsid.render.shadows import NEAR_M, ShadowPlan, Tile
@@ -21,8 +21,8 @@ from fsid.render.targets import Targets
 
 
 class ShadowPass:
-    """Owns the atlas. taps: the texture of `fsid.render.quality.tap_table`. grid: as in `Targets`. drain: as
-    in `ShadowAtlas`."""
+    """Owns the atlas. taps: the texture of `fsid.render.quality.tap_table`. grid, compute: as in `Targets`.
+    drain: as in `ShadowAtlas`."""
 
     def __init__(
         self,
@@ -31,14 +31,16 @@ class ShadowPass:
         grid: int,
         taps: moderngl.Texture,
         drain: Callable[[], None],
+        *,
+        compute: bool,
     ) -> None:
         self._context = context
         self._quality = quality
         self._taps = taps
         self._atlas = ShadowAtlas(context, drain)
         self._depth = load_program(context, "depth.vert", None)
-        self._moments = load_program(context, "screen.vert", "moments.frag")
-        self._blocks = load_program(context, "screen.vert", "shadow_blocks.frag", LENS=0, GRID=grid)
+        self._moments = ScreenProgram(context, "moments.frag", compute=compute)
+        self._blocks = ScreenProgram(context, "shadow_blocks.frag", compute=compute, LENS=0, GRID=grid)
 
     def resize(self, plan: ShadowPlan) -> None:
         """Make the atlas as large as the plan says."""
@@ -68,15 +70,15 @@ class ShadowPass:
             )
             buffers.draw(array, draw_commands(geometry.ranges, _casters(stage, tile)))
         self._context.enable_only(moderngl.NOTHING)
-        self._atlas.draw_moments(
-            [tile.corner for tile in seen], stage.plan.tile_px, lambda: buffers.draw_screen(self._moments)
-        )
+        canvas, half = self._atlas.begin_moments(), stage.plan.tile_px // 2
+        for tile in seen:
+            self._moments.draw(canvas, (tile.corner[0] // 2, tile.corner[1] // 2, half, half))
+        self._atlas.end_moments()
 
     def draw_blocks(self, targets: Targets, stage: Stage, buffers: Buffers, shot: Shot) -> None:
         """What reaches the blocks of an image whose G-buffer is drawn."""
         lens = shot.lens
-        set_uniforms(
-            self._blocks,
+        self._blocks.set(
             blocks=targets.blocks,
             through=stage.has_lobes,
             light_count=stage.plan.light_count,
@@ -88,13 +90,11 @@ class ShadowPass:
         )
         self.use(self._blocks, stage.plan)
         buffers.use()
-        targets.begin_shadow_blocks(stage.plan.light_count)
-        buffers.draw_screen(self._blocks)
+        self._blocks.draw(targets.begin_shadow_blocks(stage.plan.light_count))
 
-    def use(self, program: moderngl.Program, plan: ShadowPlan) -> None:
+    def use(self, program: ScreenProgram, plan: ShadowPlan) -> None:
         """Bind what shaders/shadows.glsl needs, but for the table of the lights."""
-        set_uniforms(
-            program,
+        program.set(
             tile_px=float(plan.tile_px),
             search_taps=self._quality.search_taps,
             filter_taps=self._quality.filter_taps,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from ctypes import c_float, c_int, c_uint, c_void_p
 from typing import Any
 
@@ -10,6 +10,7 @@ import moderngl
 import numpy as np
 
 from fsid.errors import FsidError
+from fsid.render.canvas import Canvas, make_marks
 from fsid.render.context import gl
 from fsid.render.frame import Frame
 
@@ -19,15 +20,19 @@ _COLOUR, _DEPTH = 0x1800, 0x1801
 
 
 class Targets:
-    """G-buffer of grid^2 samples per pixel (20 bytes each), occlusion per 2 x 2 pixels, result per pixel."""
+    """G-buffer of grid^2 samples per pixel (20 bytes each), occlusion per 2 x 2 pixels, result per pixel.
 
-    def __init__(self, context: moderngl.Context, grid: int) -> None:
+    compute: whether the programs that fill them are compute shaders. What `begin_...` returns is to be drawn.
+    """
+
+    def __init__(self, context: moderngl.Context, grid: int, *, compute: bool) -> None:
         self._context = context
         self._grid = grid
+        self._compute = compute
         self._owned: list[Any] = []
-        self._results: list[list[Any]] = []
-        self._lit: list[Any] = []
-        self._overview: list[Any] = []
+        self._results: list[Canvas] = []
+        self._lit: list[Canvas] = []
+        self._overview: list[Canvas] = []
         self._lit_rows = 0
         self.block_lights = 0
         self.size = self.seen = (0, 0)
@@ -51,20 +56,20 @@ class Targets:
         self._depth = context.depth_texture(large)
         self._depth.compare_func = ""
         self._block_depth = context.texture(self.blocks, 2, dtype="f4")
-        self._open, self._blurred = (context.texture(self.blocks, n, dtype="f4") for n in (4, 2))
-        self._marks = context.depth_renderbuffer(size)
-        self._results = [self._result(self._marks)]
-        self._to_missing = context.framebuffer([self._results[0][1]], self._marks)
-        self._to_marks = context.framebuffer([], self._marks)
+        self._open, self._blurred = (context.texture(self.blocks, 4, dtype="f4") for _ in range(2))
+        self._marks = make_marks(context, size, compute=self._compute)
+        self._results = [self._result()]
+        self._to_missing = Canvas(context, self._results[0].images[:1], self._marks)
+        self._to_marks = Canvas(context, [], self._marks)
         images = [self._samples, self._depth, self._block_depth, self._open, self._blurred]
         for texture in images:
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._to_samples = context.framebuffer([self._samples], self._depth)
-        self._to_block_depth = context.framebuffer([self._block_depth])
-        self._to_open = context.framebuffer([self._open])
-        self._to_blurred = context.framebuffer([self._blurred])
-        framebuffers = [self._to_samples, self._to_block_depth, self._to_open, self._to_blurred]
-        self._owned = [*framebuffers, self._to_missing, self._to_marks, self._marks, *images]
+        self._to_block_depth = Canvas(context, [self._block_depth])
+        self._to_open = Canvas(context, [self._open])
+        self._to_blurred = Canvas(context, [self._blurred])
+        canvases = [self._to_block_depth, self._to_open, self._to_blurred, self._to_missing, self._to_marks]
+        self._owned = [self._to_samples, *canvases, self._marks, *images]
 
     def begin_samples(self, *, over: bool) -> None:
         """Draw the G-buffer, from nothing; or only what lies in front of the depth that is there."""
@@ -74,35 +79,33 @@ class Targets:
         if not over:
             gl("glClearBufferfv", c_uint, c_int, c_void_p)(_DEPTH, 0, (c_float * 1)(1.0))
 
-    def begin_overview(self, width: int) -> tuple[int, int]:
-        """Draw a grid of places, `width` of them in a row; its size. Unit 0 holds the G-buffer."""
+    def begin_overview(self, width: int) -> Canvas:
+        """A grid of places, `width` of them in a row; unit 0 holds the G-buffer."""
         height = max(1, round(width * self.seen[1] / self.seen[0]))
         if not self._overview:
             texture = self._context.texture((width, height), 4, dtype="u4")
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-            self._overview = [self._context.framebuffer([texture]), texture]
+            self._overview = [Canvas(self._context, [texture])]
         self._samples.use(0)
-        self._overview[0].use()
-        return (width, height)
+        return self._overview[0]
 
     def read_overview(self) -> tuple[np.ndarray, np.ndarray]:
         """(N, 2) places, 0..1 of the G-buffer, and (N, 4) uint32 samples of it there."""
-        framebuffer, texture = self._overview
-        width, height = texture.size
-        data = framebuffer.read((0, 0, width, height), 4, dtype="u4")
+        width, height = self._overview[0].size
+        data = self._overview[0].read((0, 0, width, height), 4, 0, "u4")
         large = np.array(self.seen) * self._grid
         row, column = np.divmod(np.arange(width * height), width)
         texel = (2 * np.column_stack([column, row]) + 1) * large // (2 * np.array([width, height]))
         return (texel + 0.5) / large, np.frombuffer(data, np.uint32).reshape(-1, 4)
 
-    def begin_block_depth(self) -> None:
-        """Draw the depth of the blocks; unit 0 holds the G-buffer."""
+    def begin_block_depth(self) -> Canvas:
+        """The depth of the blocks; unit 0 holds the G-buffer."""
         self._samples.use(0)
-        self._to_block_depth.use()
+        return self._to_block_depth
 
-    def begin_shadow_blocks(self, lights: int) -> None:
-        """Draw the share of each light that reaches the blocks, of as many lights as an image is high; unit
-        0 holds the G-buffer, and unit 15 is the result for what is drawn next."""
+    def begin_shadow_blocks(self, lights: int) -> Canvas:
+        """The share of each light that reaches the blocks, of as many lights as an image is high; unit 0
+        holds the G-buffer, and unit 15 is the result for what is drawn next."""
         width, height = self.blocks
         fours = min(-(-lights // 4), self._limit // height)
         self.block_lights = min(lights, 4 * fours)
@@ -111,63 +114,61 @@ class Targets:
             self._release_lit()
             texture = self._context.texture((width, rows), 4, dtype="f4")
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-            self._lit, self._lit_rows = [self._context.framebuffer([texture]), texture], rows
-        self._lit[1].use(15)
+            self._lit, self._lit_rows = [Canvas(self._context, [texture])], rows
+        self._lit[0].images[0].use(15)
         self._samples.use(0)
-        self._lit[0].use()
+        return self._lit[0]
 
     def _release_lit(self) -> None:
-        for item in self._lit:
-            item.release()
+        _release_all(self._lit)
         self._lit, self._lit_rows = [], 0
 
-    def begin_occlusion(self) -> None:
-        """Draw the occlusion; units 0, 1 hold the G-buffer and the depth of the blocks."""
+    def begin_occlusion(self) -> Canvas:
+        """The occlusion; units 0, 1 hold the G-buffer and the depth of the blocks."""
         self._samples.use(0)
         self._block_depth.use(1)
-        self._to_open.use()
+        return self._to_open
 
-    def begin_blur(self, *, back: bool) -> None:
-        """Draw the occlusion of unit 0 into the second image, or back into the first."""
+    def begin_blur(self, *, back: bool) -> Canvas:
+        """The occlusion of unit 0 in the second image, or back in the first."""
         (self._blurred if back else self._open).use(0)
-        (self._to_open if back else self._to_blurred).use()
+        return self._to_open if back else self._to_blurred
 
-    def begin_shading(self) -> None:
-        """Draw the result; units 8, 9 hold the G-buffer and the occlusion."""
+    def begin_shading(self) -> Canvas:
+        """The result; units 8, 9 hold the G-buffer and the occlusion."""
         self._samples.use(8)
         self._open.use(9)
-        self._results[0][0].use()
+        return self._results[0]
 
-    def begin_missing(self) -> None:
-        """Draw the radiance alone, once more; the depth marks the pixels that lack some."""
-        self._to_missing.use()
+    def begin_missing(self) -> Canvas:
+        """The radiance alone, once more, with the marks of `begin_shading`."""
+        return self._to_missing
 
     def use_mirror(self, unit: int) -> None:
         """Bind radiance and depth, with mip levels, for what reflects them."""
-        radiance = self._results[0][1]
+        radiance = self._results[0].images[0]
         radiance.build_mipmaps()
         radiance.use(unit)
 
-    def begin_marks(self) -> None:
-        """Draw new marks, depth alone; unit 8 holds the G-buffer."""
-        self._to_marks.use()
+    def begin_marks(self) -> Canvas:
+        """New marks alone; unit 8 holds the G-buffer."""
+        return self._to_marks
 
-    def begin_glass(self) -> None:
-        """Draw what goes over the result, where there are marks, which stay; units 11 to 13 hold it."""
+    def begin_glass(self) -> Canvas:
+        """What goes over the result; units 11 to 13 hold it."""
         if len(self._results) == 1:
-            self._results.append(self._result(self._marks))
-            self._results[1][0].depth_mask = False
-        self._draw_over(1)
+            self._results.append(self._result())
+        return self._over(1)
 
-    def end_glass(self) -> None:
-        """Draw the result where there are marks; units 11 to 13 hold what belongs there."""
-        self._draw_over(0)
+    def end_glass(self) -> Canvas:
+        """The result; units 11 to 13 hold what belongs where there are marks."""
+        return self._over(0)
 
-    def _draw_over(self, result: int) -> None:
-        """Draw one of the two results; units 11 to 13 hold the other."""
-        for unit, texture in zip((11, 12, 13), self._results[1 - result][1:], strict=True):
+    def _over(self, result: int) -> Canvas:
+        """One of the two results; units 11 to 13 hold the other."""
+        for unit, texture in zip((11, 12, 13), self._results[1 - result].images, strict=True):
             texture.use(unit)
-        self._results[result][0].use()
+        return self._results[result]
 
     def read_radiance(self) -> tuple[np.ndarray, np.ndarray]:
         """(H, W, 3) radiance and (H, W) depth, inf where nothing was hit; row 0 at the top."""
@@ -198,36 +199,41 @@ class Targets:
         """(rows, (h, W, 4) texels) of an image of the result: together they would be the largest thing that a
         frame needs."""
         width, height = self.size
-        framebuffer = self._results[0][0]
         for first in range(0, height, _STRIP):
             rows = min(_STRIP, height - first)
-            data = framebuffer.read((0, first, width, rows), 4, attachment=image, dtype=dtype)
+            data = self._results[0].read((0, first, width, rows), 4, image, dtype)
             yield slice(first, first + rows), np.frombuffer(data, kind).reshape(rows, width, 4)
 
     def release_glass(self) -> None:
         """Free what only `begin_glass` needs."""
-        for result in self._results[1:]:
-            for item in result:
-                item.release()
+        _release_all(self._results[1:])
         del self._results[1:]
 
     def release(self) -> None:
         """Free the images."""
-        results = [part for result in self._results for part in result]
-        for item in [*self._owned, *self._overview, *results]:
+        for item in self._owned:
             item.release()
+        _release_all([*self._overview, *self._results])
         self._owned, self._results, self._overview = [], [], []
         self._release_lit()
         self.size = self.seen = (0, 0)
 
-    def _result(self, marks: Any) -> list[Any]:
-        """A framebuffer and its images: radiance and depth; albedo and id; normal. marks: its depth."""
+    def _result(self) -> Canvas:
+        """Radiance and depth; albedo and id; normal; with the marks."""
         radiance = self._context.texture(self.size, 4, dtype="f4")
         labels = [self._context.texture(self.size, 4, dtype="nu2") for _ in range(2)]
         radiance.repeat_x = radiance.repeat_y = False
         for label in labels:
             label.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        return [self._context.framebuffer([radiance, *labels], marks), radiance, *labels]
+        return Canvas(self._context, [radiance, *labels], self._marks)
+
+
+def _release_all(canvases: Sequence[Canvas]) -> None:
+    """Free canvases and their images."""
+    for canvas in canvases:
+        canvas.release()
+        for image in canvas.images:
+            image.release()
 
 
 def _fill(image: np.ndarray, texels: np.ndarray, scale: float) -> None:

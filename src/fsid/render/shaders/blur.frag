@@ -1,17 +1,18 @@
 #version 430 core
 // Openness (r) averaged along one image axis with binomial weights, among pixels of like depth (g). b: surface.
+#include "screen.glsl"
 layout(binding = 0) uniform sampler2D openness;
 layout(binding = 1) uniform sampler2D blocks;   // of block_depth.frag
 uniform ivec2 direction;
 uniform ivec2 size;
-layout(location = 0) out vec4 result;   // four: three of 32 bits need not be drawable
+OUTPUT(0, rgba32f, result);
 
 const int REACH = 5;
 const float WEIGHTS[REACH + 1] = float[](252.0, 210.0, 120.0, 45.0, 10.0, 1.0);
 const float TOLERANCE = 0.02;   // of the depth, per pixel of distance
 
 void main() {
-    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    BEGIN(pixel);
     vec2 centre = texelFetch(openness, pixel, 0).xy;
     float sum = 0.0, total = 0.0;
     for (int i = -REACH; i <= REACH; ++i) {
@@ -21,5 +22,5 @@ void main() {
         sum += weight * o.x;
         total += weight;
     }
-    result = vec4(sum / total, centre.y, texelFetch(blocks, pixel, 0).g, 0.0);
+    WRITE(result, pixel, vec4(sum / total, centre.y, texelFetch(blocks, pixel, 0).g, 0.0));
 }

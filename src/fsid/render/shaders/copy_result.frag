@@ -1,15 +1,16 @@
 #version 430 core
 // One result as another: see fsid.render.targets.
+#include "screen.glsl"
 layout(binding = 11) uniform sampler2D radiance;
 layout(binding = 12) uniform sampler2D albedo;
 layout(binding = 13) uniform sampler2D normal;
-layout(location = 0) out vec4 out_radiance;
-layout(location = 1) out vec4 out_albedo;
-layout(location = 2) out vec4 out_normal;
+OUTPUT(0, rgba32f, out_radiance);
+OUTPUT(1, rgba16, out_albedo);
+OUTPUT(2, rgba16, out_normal);
 
 void main() {
-    ivec2 pixel = ivec2(gl_FragCoord.xy);
-    out_radiance = texelFetch(radiance, pixel, 0);
-    out_albedo = texelFetch(albedo, pixel, 0);
-    out_normal = texelFetch(normal, pixel, 0);
+    BEGIN(pixel);
+    WRITE(out_radiance, pixel, texelFetch(radiance, pixel, 0));
+    WRITE(out_albedo, pixel, texelFetch(albedo, pixel, 0));
+    WRITE(out_normal, pixel, texelFetch(normal, pixel, 0));
 }

@@ -1,12 +1,14 @@
 #version 430 core
-// Marks in depth the pixels with glass in one of their samples: 0, all others 1. LENS, GRID: as in shade.frag.
+// Marks the pixels with glass in one of their samples. LENS, GRID: as in shade.frag.
+#include "screen.glsl"
 #include "encoding.glsl"
 #include "lens.glsl"
 #include "samples.glsl"
 
 void main() {
+    BEGIN(pixel);
     uint glass = 0u;
     for (int i = 0; i < COUNT; ++i)
-        glass |= texelFetch(samples, texel_seen(ray_at(place_of(ivec2(gl_FragCoord.xy), i))), 0).z;
-    gl_FragDepth = glass != 0u ? 0.0 : 1.0;
+        glass |= texelFetch(samples, texel_seen(ray_at(place_of(pixel, i))), 0).z;
+    MARK(pixel, glass != 0u);
 }

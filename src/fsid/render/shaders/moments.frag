@@ -1,11 +1,13 @@
 #version 430 core
 // Means of u and u^2 over 2 x 2 texels of the shadow atlas, u = 1 - window depth: what soft shadows filter.
+#include "screen.glsl"
 layout(binding = 0) uniform sampler2D depth;
-layout(location = 0) out vec2 moments;
+OUTPUT(0, rg32f, moments);
 
 void main() {
-    ivec2 corner = 2 * ivec2(gl_FragCoord.xy);
+    BEGIN(texel);
+    ivec2 corner = 2 * texel;
     vec4 u = 1.0 - vec4(texelFetch(depth, corner, 0).r, texelFetch(depth, corner + ivec2(1, 0), 0).r,
                         texelFetch(depth, corner + ivec2(0, 1), 0).r, texelFetch(depth, corner + ivec2(1, 1), 0).r);
-    moments = 0.25 * vec2(dot(u, vec4(1)), dot(u, u));
+    WRITE(moments, texel, 0.25 * vec4(dot(u, vec4(1)), dot(u, u), 0, 0));
 }

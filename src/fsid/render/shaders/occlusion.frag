@@ -3,6 +3,7 @@
 // 2012) with four fixed spirals of taps, one for each block of a square of 2 x 2. What they differ by, and what
 // they leave of the outlines of occluders, is smoothed by blur.frag, whose weights take equal shares of all four.
 // Output: openness 0..1, depth (0 = no hit).
+#include "screen.glsl"
 #include "encoding.glsl"
 layout(binding = 0) uniform usampler2D samples;
 layout(binding = 1) uniform sampler2D depth;    // metres, of the blocks; 0 = no hit
@@ -13,7 +14,7 @@ uniform vec2 shift;      // half image sizes
 uniform ivec2 size;      // blocks
 uniform mat3 axes;       // rows right, up, forward
 uniform int taps;
-layout(location = 0) out vec2 result;
+OUTPUT(0, rgba32f, result);
 
 const float RADIUS_M = 0.35;
 const float MAX_SCREEN = 0.2;   // of the image width
@@ -28,7 +29,7 @@ void plane_ahead(out vec2 per_block, out vec2 corner) {
 }
 
 void main() {
-    ivec2 block = ivec2(gl_FragCoord.xy);
+    BEGIN(block);
     vec2 per_block, corner;
     plane_ahead(per_block, corner);
     float z = texelFetch(depth, block, 0).r;
@@ -53,5 +54,5 @@ void main() {
         sum += other_z > 0.0 ? f * f * f * max(dot(v, n) - floor_m, 0.0) / (vv + 0.0004) : 0.0;
     } while (++i < count);
     float covered = sum * 5.0 * RADIUS_M / (r2 * r2 * r2 * float(taps));
-    result = hit ? vec2(max(1.0 - covered, 0.1), z) : vec2(1.0, 0.0);
+    WRITE(result, block, hit ? vec4(max(1.0 - covered, 0.1), z, 0, 0) : vec4(1, 0, 0, 0));
 }

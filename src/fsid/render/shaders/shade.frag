@@ -4,8 +4,9 @@
 // inside a surface is one such group, one at an edge two or three. Output: the frame at its final size.
 // GRID: edge of the square of samples per pixel. LOBES: 1 with clearcoat, sheen and translucency. AREAS: 1 with
 // area lights. GLASS: 1 in the second pass, whose samples are glass alone and which looks what is behind up in
-// the result of the first. OWN: 0 leaves lights out whose shadow is not interpolated and marks the pixel in depth, 1
+// the result of the first. OWN: 0 leaves lights out whose shadow is not interpolated and marks the pixel, 1
 // adds those lights alone, 2 is both at once. PLANAR: 1 with an image of the scene as smooth ground in z = 0 reflects it.
+#include "screen.glsl"
 #include "encoding.glsl"
 #include "surfaces.glsl"
 #include "material.glsl"
@@ -28,10 +29,10 @@ layout(binding = 11) uniform sampler2D behind;          // as out_radiance
 layout(binding = 12) uniform sampler2D behind_albedo;   // as out_albedo
 layout(binding = 13) uniform sampler2D behind_normal;   // as out_normal
 #endif
-layout(location = 0) out vec4 out_radiance;   // a: depth in metres, 0 where nothing was hit
+OUTPUT(0, rgba32f, out_radiance);   // a: depth in metres, 0 where nothing was hit
 #if OWN != 1
-layout(location = 1) out vec4 out_albedo;     // a: (object id + 1) / 65535
-layout(location = 2) out vec4 out_normal;     // camera space, 0.5 + 0.5 n
+OUTPUT(1, rgba16, out_albedo);     // a: (object id + 1) / 65535
+OUTPUT(2, rgba16, out_normal);     // camera space, 0.5 + 0.5 n
 #endif
 
 // Light of all lights. First those whose shadow is interpolated; the others need their own, which costs much
@@ -134,7 +135,7 @@ vec3 moves(Sample p, vec3 ray, vec3 step) {
 }
 
 void main() {
-    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    BEGIN(pixel);
     vec3 local = ray_at(vec2(pixel) + 0.5);
     vec3 ray = local * axes;
     vec3 right = (ray_at(vec2(pixel) + vec2(1.5, 0.5)) - local) * axes;
@@ -181,26 +182,29 @@ void main() {
     float r2 = dot(corner, corner * vec2(size * size)) / dot(vec2(size), vec2(size));
     float gain = max(1.0 + r2 * (vignetting.x + r2 * (vignetting.y + r2 * vignetting.z)), 0.0);
 #if OWN == 1
-    out_radiance = vec4(sum * (gain / float(COUNT)), 0.0);
+    WRITE(out_radiance, pixel, vec4(sum * (gain / float(COUNT)), 0.0));
 #else
-    out_radiance = vec4(sum * (gain / float(COUNT)), label.surface >= 0 ? label.depth : 0.0);
-    out_albedo = vec4(albedo / float(COUNT), float(id) / 65535.0);
+    vec4 light = vec4(sum * (gain / float(COUNT)), label.surface >= 0 ? label.depth : 0.0);
+    vec4 labels = vec4(albedo / float(COUNT), float(id) / 65535.0);
     vec3 normal = dot(label.normal, label.face_normal) < 0.0 ? -label.normal : label.normal;
     normal = axes * normalize(normal + relief) * vec3(1, 1, -1);
-    out_normal = vec4(0.5 + 0.5 * (label.surface >= 0 ? normal : vec3(0, 0, 1)), 0.0);
+    vec4 facing = vec4(0.5 + 0.5 * (label.surface >= 0 ? normal : vec3(0, 0, 1)), 0.0);
 #if GLASS
     float bare = 1.0 - covered / float(COUNT);
     vec4 far = texelFetch(behind, pixel, 0), far_albedo = texelFetch(behind_albedo, pixel, 0);
-    out_radiance.rgb += bare * far.rgb;
-    out_albedo.rgb += bare * far_albedo.rgb;
+    light.rgb += bare * far.rgb;
+    labels.rgb += bare * far_albedo.rgb;
     if (label.surface < 0) {
-        out_radiance.a = far.a;
-        out_albedo.a = far_albedo.a;
-        out_normal = texelFetch(behind_normal, pixel, 0);
+        light.a = far.a;
+        labels.a = far_albedo.a;
+        facing = texelFetch(behind_normal, pixel, 0);
     }
 #endif
+    WRITE(out_radiance, pixel, light);
+    WRITE(out_albedo, pixel, labels);
+    WRITE(out_normal, pixel, facing);
 #if OWN == 0
-    gl_FragDepth = missing ? 0.0 : 1.0;
+    MARK(pixel, missing);
 #endif
 #endif
 }

@@ -1,6 +1,7 @@
 #version 430 core
 // Share of each light that reaches one sample per block of 2 x 2 pixels, for shade.frag to interpolate where it
 // varies smoothly: four lights a texel, the next four below, blocks.y rows each. 2: not smooth enough for that.
+#include "screen.glsl"
 #include "encoding.glsl"
 #include "lights.glsl"
 #include "shadows.glsl"
@@ -10,12 +11,12 @@ uniform ivec2 blocks;
 uniform bool through;     // whether there are surfaces that pass light on
 uniform mat3 axes;        // rows right, up, forward
 uniform vec3 origin;
-layout(location = 0) out vec4 result;
+OUTPUT(0, rgba32f, shares);
 
 const float SLANTED = 0.05;   // cosine below which a surface is not followed further
 
 void main() {
-    ivec2 at = ivec2(gl_FragCoord.xy);
+    BEGIN(at);
     ivec2 texel = block_texel(ivec2(at.x, at.y % blocks.y));
     uvec4 code = texelFetch(samples, texel, 0);
     vec3 ray = seen_ray((vec2(texel) + 0.5) / float(GRID)) * axes;
@@ -25,7 +26,7 @@ void main() {
     float slant = max(abs(dot(n, ray)) / length(ray), SLANTED);
     float block_m = depth * length(4.0 / (seen_focal * vec2(seen))) / slant;
     int first = 4 * (at.y / blocks.y), i = 0;
-    result = vec4(0);
+    vec4 result = vec4(0);
     do {
         Light light = light_at(first + i);
         vec3 to_light = light.kind == SUN ? -light.direction : light.position - position;
@@ -36,4 +37,5 @@ void main() {
         float lit = visibility(light, position, n, wanted, block_m, even);
         result[i] = even ? lit : 2.0;
     } while (++i < min(4, light_count - first));
+    WRITE(shares, at, result);
 }

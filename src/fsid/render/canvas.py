@@ -1,0 +1,53 @@
+"""Images that one program fills together, and marks on their pixels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import moderngl
+
+_MARKS_UNIT = 3  # binding of shaders/screen.glsl
+
+
+class Canvas:
+    """Drawn into through a framebuffer, or as images by a compute shader. marks: of `make_marks`; may be
+    shared between canvases. Images and marks stay the caller's; `release` frees the rest."""
+
+    def __init__(
+        self, context: moderngl.Context, images: Sequence[moderngl.Texture], marks: Any = None
+    ) -> None:
+        self.images = tuple(images)
+        self.size: tuple[int, int] = (images or [marks])[0].size
+        self._marks_image = marks if isinstance(marks, moderngl.Texture) else None
+        depth = marks if self._marks_image is None else None
+        self._framebuffer: Any = None
+        if images or depth is not None:
+            self._framebuffer = context.framebuffer(list(images), depth)
+
+    def use_framebuffer(self, box: tuple[int, int, int, int] | None, *, mark: bool) -> None:
+        """Draw into it, or into a box of it: left, top, width, height. mark: whether depth is written."""
+        self._framebuffer.scissor = box
+        self._framebuffer.depth_mask = mark
+        self._framebuffer.use()
+
+    def use_images(self) -> None:
+        """Bind the images to the image units 0, 1, ... and the marks to theirs."""
+        for unit, image in enumerate(self.images):
+            image.bind_to_image(unit, read=True, write=True)
+        if self._marks_image is not None:
+            self._marks_image.bind_to_image(_MARKS_UNIT, read=True, write=True)
+
+    def read(self, box: tuple[int, int, int, int], components: int, image: int, dtype: str) -> bytes:
+        """Texels of a box of one of its images."""
+        return bytes(self._framebuffer.read(box, components, attachment=image, dtype=dtype))
+
+    def release(self) -> None:
+        """Free the framebuffer."""
+        if self._framebuffer is not None:
+            self._framebuffer.release()
+
+
+def make_marks(context: moderngl.Context, size: tuple[int, int], *, compute: bool) -> Any:
+    """Marks for images of `size`: depth, which tests fragments before they are computed, or an image."""
+    return context.texture(size, 1) if compute else context.depth_renderbuffer(size)
