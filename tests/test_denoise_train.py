@@ -33,6 +33,8 @@ from fsid.denoise import (  # noqa: E402
     load_history,
     train,
 )
+from fsid.denoise.checkpoint import load_checkpoint  # noqa: E402
+from fsid.denoise.raw_denoiser import RawDenoiser  # noqa: E402
 from fsid.denoise.stabilise import stabilise, unstabilise  # noqa: E402
 from fsid.denoise.train import learning_rate, noise_left  # noqa: E402
 from fsid.denoise.validate import held_out, validation  # noqa: E402
@@ -142,6 +144,21 @@ def test_a_killed_training_ends_with_the_same_bits(tmp_path: Path) -> None:
     assert not torch.equal(weights["net.intro.weight"], torch.zeros_like(weights["net.intro.weight"]))
     assert train(folder, tmp_path / "b", config, quiet=True).read_bytes() == undisturbed.read_bytes()
     assert resumed == tmp_path / "b" / "model.safetensors"
+
+
+@pytest.mark.filterwarnings("ignore:for .* copying from a non-meta parameter")
+def test_the_state_of_the_optimizer_comes_back_to_the_device_of_the_weights(
+    data: Path, tmp_path: Path
+) -> None:
+    """On a GPU the fused AdamW reads even the count of steps there; "meta" stands for one."""
+    train(data, tmp_path, CONFIG, quiet=True)
+    net = RawDenoiser(CONFIG.network).to("meta")
+    optimizer = torch.optim.AdamW(net.parameters())
+    state = load_checkpoint(tmp_path, net, optimizer)
+    assert all(tensor.is_meta for tensor in state.average.values())
+    for parameter in net.parameters():
+        assert set(optimizer.state[parameter]) == {"step", "exp_avg", "exp_avg_sq"}
+        assert all(tensor.is_meta for tensor in optimizer.state[parameter].values())
 
 
 def test_two_processes_train_one_network(data: Path, tmp_path: Path) -> None:

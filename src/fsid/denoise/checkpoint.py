@@ -97,7 +97,8 @@ def load_checkpoint(run_dir: Path, net: nn.Module, optimizer: torch.optim.Optimi
     for name, parameter in net.named_parameters():
         moments = {moment: torch.empty_like(parameter) for moment in _MOMENTS}
         _copy({moment: tensors.get(f"{moment}.{name}", torch.empty(0)) for moment in _MOMENTS}, moments, path)
-        optimizer.state[parameter] = {"step": torch.tensor(float(state.step)), **moments}
+        step = torch.tensor(float(state.step), device=parameter.device)  # the fused kernel reads it there
+        optimizer.state[parameter] = {"step": step, **moments}
     return state
 
 
