@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -26,6 +27,7 @@ class Outer:
     wide: bool = False
     size_m: tuple[float, float] = (1.0, 2.0)
     inner: Inner = field(default_factory=Inner)
+    fast: Literal["auto", "on", "off"] = "auto"
 
 
 def test_later_overlays_win(tmp_path: Path):
@@ -33,6 +35,13 @@ def test_later_overlays_win(tmp_path: Path):
     file.write_text("count: 5\ninner: {rate: 2}\n")
     got = load_settings(Outer, file, ["inner.rate=1e-3", "inner.names=[x, y]", "wide=true"])
     assert got == Outer(5, True, (1.0, 2.0), Inner(1e-3, ("x", "y")))
+
+
+def test_on_and_off_may_go_without_quotes():
+    """YAML takes them for true and false."""
+    for word in ("on", "off", "auto"):
+        for text in (word, f"'{word}'"):
+            assert load_settings(Outer, None, [f"fast={text}"]).fast == word
 
 
 def test_a_pair_is_taken_as_it_is_and_texts_are_yaml():
@@ -65,6 +74,8 @@ def test_settings_made_in_python_are_saved(tmp_path: Path):
         ("inner.rate=-1", "inner.rate"),
         ("size_m=[1]", "size_m"),
         ("size_m=[1, x]", "size_m"),
+        ("fast=maybe", "fast: 'maybe' is not one of auto, on, off"),
+        ("fast=[on]", "fast: [True] is not one of auto, on, off"),
         ("inner.names=mug", "names: 'mug' is not a list; write [mug]"),
         ("inner.names=[1]", "names"),
         ("count.x=1", "count"),

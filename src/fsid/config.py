@@ -13,7 +13,7 @@ import copy
 import dataclasses
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar, get_args, get_origin
+from typing import Any, Literal, TypeVar, get_args, get_origin
 
 import cattrs
 import numpy as np
@@ -65,8 +65,17 @@ def _strict_tuple(value: Any, kind: Any) -> tuple[Any, ...]:
     return tuple(_CONVERTER.structure(item, inner) for item, inner in zip(value, kinds, strict=True))
 
 
+def _strict_choice(value: Any, kind: Any) -> str:
+    """YAML reads an unquoted on and off as true and false."""
+    word = ("off", "on")[value] if isinstance(value, bool) else value
+    if word not in get_args(kind):
+        raise ValueError(f"{value!r} is not one of {', '.join(get_args(kind))}")
+    return word
+
+
 _CONVERTER = cattrs.Converter(forbid_extra_keys=True)
 _CONVERTER.register_structure_hook_func(lambda kind: get_origin(kind) is tuple, _strict_tuple)
+_CONVERTER.register_structure_hook_func(lambda kind: get_origin(kind) is Literal, _strict_choice)
 for _kind, _hook in ((int, _strict_int), (float, _strict_float), (bool, _strict_bool), (str, _strict_str)):
     _CONVERTER.register_structure_hook(_kind, _hook)
 
