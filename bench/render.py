@@ -12,8 +12,8 @@ room, three shadowed point and spot lights, 20 materials without clearcoat, shee
 triangles. Memory over many scenes: bench/dataset.py --only memory.
 
 --workers 1 4 16 counts the frames that so many processes make together in --seconds at 1920x1080: every frame
-another scene, sampled, built, drawn and read back. Each worker draws --frames scenes before the clock starts;
-texels of materials come from the cache on disk where they are neither resident nor new.
+another scene, sampled, built, drawn and read back. Each worker draws --frames scenes before the clock starts,
+which compiles; texels of materials come from the cache on disk where they are neither resident nor new.
 """
 
 from __future__ import annotations

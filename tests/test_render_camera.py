@@ -59,7 +59,11 @@ def test_points_are_where_the_formula_says(renderer: Renderer, name: str) -> Non
 
 @pytest.mark.parametrize("name", LENSES)
 def test_depth_and_radiance_agree_with_the_bent_rays(renderer: Renderer, name: str) -> None:
-    """A slanted plane: depth is that of the labels' ray, light that of the pixel, everywhere."""
+    """A slanted plane: depth is that of the labels' ray, light that of the pixel, everywhere.
+
+    Depth of the far plane is as exact as places of vertices in the image, which drivers round to 1/256 pixel
+    (llvmpipe stays within 2e-5, an NVIDIA H200 within 6e-5).
+    """
     camera = replace(
         FROM_ABOVE, position_m=(0.3, -1.5, 1.2), target_m=(0.1, -0.2, 0.0), distortion=LENSES[name]
     )
@@ -67,7 +71,7 @@ def test_depth_and_radiance_agree_with_the_bent_rays(renderer: Renderer, name: s
     frame = draw(renderer, view(lambertian(grid(60.0)), lights=(light,), camera=camera))
     depth, _ = plane_hits(camera, LABEL_SAMPLE)
     near = (depth > 0) & (depth < 8)
-    np.testing.assert_allclose(frame.depth[near], depth[near], rtol=2e-5)
+    np.testing.assert_allclose(frame.depth[near], depth[near], rtol=1e-4)
     _, points = plane_hits(camera, 0.5)
     to = np.array(light.position_m) - points
     expected = 0.5 / np.pi * 3.0 * to[..., 2] / np.linalg.norm(to, axis=-1) ** 3

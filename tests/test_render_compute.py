@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from ctypes import c_int, c_uint, c_void_p
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from fsid.render import Frame, Renderer
+from fsid.render.context import gl
+from fsid.render.mip_levels import MipLevels
+from fsid.render.texels import level_ranges
+from fsid.render.texture_array import TextureArray
 from fsid.scene import Distortion, LightConfig, Scene, SceneConfig, sample
 
 BARREL = Distortion("brown-conrady", (-0.18, 0.03, 0.001, -0.001, 0.0))
@@ -55,3 +60,75 @@ def test_an_image_may_have_any_size() -> None:
         fragments, computed = (drawn([which], compute=c, supersampling=2)[0] for c in (False, True))
         assert computed.radiance.shape == (height, width, 3)
         np.testing.assert_allclose(computed.radiance, fragments.radiance, rtol=1e-3, atol=1e-6)
+
+
+@pytest.mark.parametrize("size", [(96, 48), (50, 34), (37, 5)])
+@pytest.mark.parametrize("components", [2, 4])
+def test_mip_levels_are_those_of_the_driver(size: tuple[int, int], components: int) -> None:
+    """A texel of a level is the mean of what it covers, for odd sizes, too, as llvmpipe makes it."""
+    texels = np.random.default_rng(4).random((*size[::-1], components)).astype(np.float32)
+    with Renderer() as renderer:
+        if not renderer.info.is_software:
+            pytest.skip("drivers of GPUs make the levels of odd sizes in other ways")
+        levels = []
+        for compute in (False, True):
+            texture = renderer._context.texture(size, components, texels, dtype="f4")
+            MipLevels(renderer._context, compute=compute).fill(texture)
+            count = max(size).bit_length()
+            levels.append([np.frombuffer(texture.read(level=i), np.float32) for i in range(count)])
+    for driver, computed in zip(*levels, strict=True):
+        np.testing.assert_allclose(computed, driver, rtol=1e-5)
+
+
+def test_a_layer_by_way_of_a_buffer_is_the_same() -> None:
+    texels = np.random.default_rng(5).integers(0, 256, (level_ranges(64)[-1][1].stop, 4), np.uint8)
+    with Renderer() as renderer:
+        found = []
+        for buffered in (False, True):
+            array = TextureArray(renderer._context, 64, 3, buffered=buffered)
+            array.write(1, texels)
+            array.use(0)
+            found.append(np.zeros((3, 64, 64, 4), np.uint8))
+            read = gl("glGetTexImage", c_uint, c_int, c_uint, c_uint, c_void_p)
+            read(0x8C1A, 0, 0x1908, 0x1401, found[-1].ctypes.data)
+    np.testing.assert_array_equal(found[1][1], texels[:4096].reshape(64, 64, 4))
+    np.testing.assert_array_equal(found[0][1], found[1][1])
+
+
+def test_the_exact_filter_is_the_filter_of_the_driver() -> None:
+    """What GPUs have instead of a lookup, on a driver whose lookups are exact; each level by itself."""
+    rng = np.random.default_rng(3)
+    places = np.zeros((64, 64, 4), np.float32)
+    places[..., :2] = rng.random((64, 64, 2))
+    with Renderer() as renderer:
+        if not renderer.info.is_software:
+            pytest.skip("a GPU's own filter is not exact")
+        context = renderer._context
+        moments = context.texture((96, 46), 2, rng.random((46, 96, 2)).astype(np.float32), dtype="f4")
+        moments.build_mipmaps()
+        moments.repeat_x = moments.repeat_y = False
+        moments.use(3)
+        program = context.compute_shader(FILTERS)
+        for level in (0.0, 0.3, 1.0, 2.75, 5.5, 9.0):
+            places[..., 2] = level
+            texels = context.texture((64, 64), 4, places, dtype="f4")
+            texels.bind_to_image(0, read=True, write=True)
+            program.run(8, 8)
+            found = np.frombuffer(texels.read(), np.float32).reshape(64, 64, 4)
+            np.testing.assert_allclose(found[..., :2], found[..., 2:], atol=1e-6)
+            assert np.ptp(found) > 0
+
+
+FILTERS = """
+#version 430 core
+#define EXACT_FILTER 1
+#include "moments.glsl"
+layout(local_size_x = 8, local_size_y = 8) in;
+layout(binding = 0, rgba32f) uniform image2D places;
+
+void main() {
+    ivec2 at = ivec2(gl_GlobalInvocationID.xy);
+    vec4 p = imageLoad(places, at);
+    imageStore(places, at, vec4(textureLod(shadow_moments, p.xy, p.z).xy, moments_at(p.xy, p.z)));
+}
+""".strip()

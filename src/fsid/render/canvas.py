@@ -12,17 +12,25 @@ _MARKS_UNIT = 3  # binding of shaders/screen.glsl
 
 class Canvas:
     """Drawn into through a framebuffer, or as images by a compute shader. marks: of `make_marks`; may be
-    shared between canvases. Images and marks stay the caller's; `release` frees the rest."""
+    shared between canvases. level: a mip level of the images, for compute shaders alone where it is not 0.
+    Images and marks stay the caller's; `release` frees the rest."""
 
     def __init__(
-        self, context: moderngl.Context, images: Sequence[moderngl.Texture], marks: Any = None
+        self,
+        context: moderngl.Context,
+        images: Sequence[moderngl.Texture],
+        marks: Any = None,
+        *,
+        level: int = 0,
     ) -> None:
         self.images = tuple(images)
-        self.size: tuple[int, int] = (images or [marks])[0].size
+        width, height = (images or [marks])[0].size
+        self.size = (max(width >> level, 1), max(height >> level, 1))
+        self._level = level
         self._marks_image = marks if isinstance(marks, moderngl.Texture) else None
         depth = marks if self._marks_image is None else None
         self._framebuffer: Any = None
-        if images or depth is not None:
+        if level == 0 and (images or depth is not None):
             self._framebuffer = context.framebuffer(list(images), depth)
 
     def use_framebuffer(self, box: tuple[int, int, int, int] | None, *, mark: bool) -> None:
@@ -34,7 +42,7 @@ class Canvas:
     def use_images(self) -> None:
         """Bind the images to the image units 0, 1, ... and the marks to theirs."""
         for unit, image in enumerate(self.images):
-            image.bind_to_image(unit, read=True, write=True)
+            image.bind_to_image(unit, read=True, write=True, level=self._level)
         if self._marks_image is not None:
             self._marks_image.bind_to_image(_MARKS_UNIT, read=True, write=True)
 

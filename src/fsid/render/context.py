@@ -22,6 +22,7 @@ from fsid.errors import FsidError
 REQUIRED_VERSION = 430
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3
 _LARGE_BYTES, _KEPT_BYTES = 2**20, 2**26
+_MOST_BYTES = 2**25  # glibc's largest threshold
 _MAX_DEVICES = 16
 _SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swiftshader")
 _HELP = (
@@ -121,6 +122,15 @@ def return_large_blocks() -> None:
         mallopt(_M_TRIM_THRESHOLD, _KEPT_BYTES)
 
 
+def keep_blocks() -> None:
+    """Have glibc keep what is freed: beside a GPU every core draws frames of its own, and fresh pages of a
+    virtual machine cost more than the memory is worth. Elsewhere nothing happens."""
+    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
+    if mallopt is not None:
+        mallopt(_M_MMAP_THRESHOLD, _MOST_BYTES)
+        mallopt(_M_TRIM_THRESHOLD, 2**30)
+
+
 def return_free_blocks() -> None:
     """Have glibc give back every page that holds nothing. Elsewhere nothing happens."""
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
@@ -134,6 +144,10 @@ def _create(device_index: int) -> moderngl.Context:
     # llvmpipe filters textures of 8 bits in 8 bits, in steps as large as read noise, unless it is told not
     # to before the process's first context.
     os.environ.setdefault("GALLIVM_PERF", "no_aos_sampling")
+    # NVIDIA's waits for the GPU by asking all the time, in two threads, unless it is told to sleep: several
+    # processes that share a GPU would take the processor from each other.
+    os.environ.setdefault("__GL_YIELD", "USLEEP")
+    os.environ.setdefault("__GL_THREADED_OPTIMIZATIONS", "0")
     try:
         return moderngl.create_context(require=REQUIRED_VERSION, standalone=True, **settings)
     except Exception as error:  # the EGL backend raises bare Exception

@@ -60,11 +60,14 @@ class LayerStore:
         size: int,
         drain: Callable[[], None] | None = None,
         budget_bytes: int = BUDGET_BYTES,
+        *,
+        frugal: bool = True,
     ) -> None:
         """drain: called before arrays are freed, so that the driver does not hold them (`Drain.run`).
-        budget_bytes: of what stays resident."""
+        budget_bytes: of what stays resident. frugal: wait after each upload, or drivers keep them."""
         self._context = context
         self._drain = drain or context.finish
+        self._frugal = frugal
         self._size = size
         self._budget_layers = min(MOST_LAYERS, max(1, budget_bytes // _layer_bytes(size)))
         self._resident: OrderedDict[Hashable, Layer] = OrderedDict()
@@ -116,7 +119,7 @@ class LayerStore:
         old one is free before the next is made, so that growth takes little more than the result."""
         self._drain()
         for i in range(2):
-            target = TextureArray(self._context, self._size, capacity)
+            target = TextureArray(self._context, self._size, capacity, buffered=not self._frugal)
             if self._capacity:
                 target.take(self._arrays[i])
                 self._context.finish()
@@ -131,6 +134,7 @@ class LayerStore:
         slot = next(i for i in range(self._capacity) if i not in taken)
         for array, data in zip(self._arrays, texels.data, strict=True):
             array.write(slot, data)
-        self._context.finish()  # or drivers keep the uploads of a whole scene
+        if self._frugal:
+            self._context.finish()
         roughness, metallic = (float(texels.data[i][-1, 3]) / 255 for i in range(2))
         return Layer(slot, texels.slope_scale, texels.shares, roughness, metallic)

@@ -9,6 +9,7 @@ import moderngl
 import numpy as np
 
 from fsid.render.canvas import Canvas
+from fsid.render.context import gl_info
 
 _SHADERS = files("fsid.render") / "shaders"
 _INCLUDES = tuple(sorted(file.name for file in _SHADERS.iterdir() if file.name.endswith(".glsl")))
@@ -39,11 +40,12 @@ class ScreenProgram:
         compute: bool,
         marks: int = 0,
         adds: bool = False,
-        **defines: int,
+        **defines: int | str,
     ) -> None:
         _register(context)
         self._context, self._compute, self._marks, self._adds = context, compute, marks, adds
-        defines = {"COMPUTE": int(compute), "MARKS": marks, "ADDS": int(adds), **defines}
+        exact = int(not gl_info(context).is_software)
+        defines |= {"COMPUTE": int(compute), "MARKS": marks, "ADDS": int(adds), "EXACT_FILTER": exact}
         lines = "".join(f"#define {name} {value}\n" for name, value in defines.items())
         version, rest = _source(source).split("\n", 1)
         text = f"{version}\n{lines}{rest}"

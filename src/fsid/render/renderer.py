@@ -24,7 +24,14 @@ from fsid.errors import FsidError
 from fsid.render.buffers import Buffers
 from fsid.render.camera import lens_of
 from fsid.render.colour_contrast import set_colour_contrast
-from fsid.render.context import GlInfo, gl_info, open_context, return_free_blocks, return_large_blocks
+from fsid.render.context import (
+    GlInfo,
+    gl_info,
+    keep_blocks,
+    open_context,
+    return_free_blocks,
+    return_large_blocks,
+)
 from fsid.render.defocus import defocus
 from fsid.render.drain import Drain
 from fsid.render.drawable import View, view_of
@@ -32,7 +39,8 @@ from fsid.render.exposure import Shot, is_moving, shots_of
 from fsid.render.flow import flow_between
 from fsid.render.frame import Frame
 from fsid.render.fringes import inside, magnified, with_margin
-from fsid.render.layers import BUDGET_BYTES, GPU_BUDGET_BYTES, Layer, LayerStore, fitting_size
+from fsid.render.layers import GPU_BUDGET_BYTES, Layer, LayerStore, fitting_size
+from fsid.render.mip_levels import MipLevels
 from fsid.render.mirror import MOST, Mirror, clearest_mirror, ground_mirror
 from fsid.render.occlusion_pass import OcclusionPass
 from fsid.render.overview import OverviewPass
@@ -91,12 +99,12 @@ class Renderer:
         self._quality = QUALITIES[quality]
         self._lens_images = lens_images
         self._grid = supersampling
-        return_large_blocks()
         self._context = open_context(device_index)
         self._thread = threading.get_ident()
         Renderer._active = self
         try:
             self._on_gpu = not self.info.is_software
+            (keep_blocks if self._on_gpu else return_large_blocks)()
             self._prepare(texture_size, self._on_gpu if compute is None else compute)
         except BaseException:
             self.close()
@@ -107,12 +115,13 @@ class Renderer:
         self._texture_size = texture_size
         self._drain = context.finish if self._on_gpu else Drain(context).run
         self._layers = self._new_layers(texture_size)
-        self._targets = Targets(context, grid, compute=compute)
-        self._mirror_targets = [Targets(context, grid, compute=compute) for _ in range(MOST)]
+        mips = MipLevels(context, compute=compute)
+        self._targets = Targets(context, grid, mips, compute=compute)
+        self._mirror_targets = [Targets(context, grid, mips, compute=compute) for _ in range(MOST)]
         table = tap_table(quality)
         self._taps = context.texture((table.shape[1], table.shape[0]), 2, table.tobytes(), dtype="f4")
         self._taps.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        self._shadows = ShadowPass(context, quality, grid, self._taps, self._drain, compute=compute)
+        self._shadows = ShadowPass(context, quality, grid, self._taps, self._drain, mips, compute=compute)
         self._samples = SamplePass(context)
         self._overview = OverviewPass(context)
         self._occlusion = OcclusionPass(context, quality, grid, self._taps, compute=compute)
@@ -247,7 +256,8 @@ class Renderer:
             for targets in self._mirror_targets:
                 targets.release()
             self._targets.release_glass()
-            return_free_blocks()
+            if not self._on_gpu:
+                return_free_blocks()
 
     def _load_layers(self, view: View, bake: Bake) -> dict[tuple[str, int], Layer]:
         wanted = {(m.family, m.variant): None for d in view.drawables for m in d.materials}
@@ -258,9 +268,9 @@ class Renderer:
         return self._layers.load(wanted, bake)
 
     def _new_layers(self, size: int) -> LayerStore:
-        return LayerStore(
-            self._context, size, self._drain, GPU_BUDGET_BYTES if self._on_gpu else BUDGET_BYTES
-        )
+        if self._on_gpu:
+            return LayerStore(self._context, size, self._drain, GPU_BUDGET_BYTES, frugal=False)
+        return LayerStore(self._context, size, self._drain)
 
     def _mirrors(self, view: View, shot: Shot, layers: dict[tuple[str, int], Layer]) -> list[Mirror]:
         """The flat smooth surfaces that show images, from the G-buffer."""
@@ -289,7 +299,8 @@ class Renderer:
         if stage.glass.any():
             self._samples.draw_glass(targets, stage, buffers, shot)
             self._shade.draw_glass(targets, stage, buffers, shot, self._layers)
-        self._context.finish()
+        if not self._on_gpu:
+            self._context.finish()
 
 
 def _through_lens(shot: Shot, camera: Camera, radiance: np.ndarray, depth: np.ndarray) -> np.ndarray:

@@ -4,8 +4,8 @@ Most pixels find their shadows between those of the blocks. Lights whose shadow 
 itself are drawn after the rest, where the rest has left a mark, and glass only where there is some: on a CPU
 every pixel pays for all that a shader can do.
 
-What a scene does not have costs nothing: a program is compiled for each combination of lens, layers, area
-lights, glass and mirrors that occurs.
+What a scene does not have costs nothing on a CPU: a program is compiled for each combination of lens, layers,
+area lights, glass and mirrors that occurs. Compilers of GPUs take seconds for each, so there one does it all.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from fsid.render.buffers import Buffers
 from fsid.render.canvas import Canvas
 from fsid.render.exposure import Shot
 from fsid.render.layers import LayerStore
+from fsid.render.mirror import MOST
 from fsid.render.programs import ScreenProgram
 from fsid.render.quality import Quality
 from fsid.render.reflectance import lobe_table, reflectance_table
@@ -58,12 +59,17 @@ class ShadePass:
     ) -> None:
         """Everything but glass. mirrors: planes, and the images that they show. shining: whether what emits
         light is seen to."""
+        for i in range(MOST):
+            self._reflectance.use(11 + i)  # any image will do where there is no mirror, but none will not
         for i, (_, image) in enumerate(mirrors):
             image.use_mirror(11 + i)
-        planes = np.array([plane for plane, _ in mirrors])
+        planar = MOST if self._compute else len(mirrors)
+        planes = np.zeros((planar, 4))  # no surface lies in a plane without normal
+        for own_plane, (plane, _) in zip(planes, mirrors, strict=False):
+            own_plane[:] = plane
         for own, canvas in enumerate((targets.begin_shading(), targets.begin_missing())):
             program = self._shading(
-                shot.lens.model, stage, marks=1 + own, adds=own == 1, GLASS=0, PLANAR=len(mirrors), OWN=own
+                shot.lens.model, stage, marks=1 + own, adds=own == 1, GLASS=0, PLANAR=planar, OWN=own
             )
             program.set(block_lights=targets.block_lights, shining=float(shining), mirror_planes=planes)
             self._shade(program, canvas, targets, stage, buffers, shot, layers)
@@ -108,10 +114,11 @@ class ShadePass:
     def _shading(
         self, lens_model: int, stage: Stage, *, marks: int, adds: bool = False, **defines: int
     ) -> ScreenProgram:
-        lobes, areas = int(stage.has_lobes), int(stage.has_areas)
-        return self._program(
-            "shade.frag", marks=marks, adds=adds, LENS=lens_model, LOBES=lobes, AREAS=areas, **defines
-        )
+        if self._compute:
+            found = {"LOBES": 1, "AREAS": 1}
+        else:
+            found = {"LOBES": int(stage.has_lobes), "AREAS": int(stage.has_areas)}
+        return self._program("shade.frag", marks=marks, adds=adds, LENS=lens_model, **defines, **found)
 
     def _program(self, source: str, *, marks: int, adds: bool = False, **defines: int) -> ScreenProgram:
         key = (source, marks, adds, *defines.items())

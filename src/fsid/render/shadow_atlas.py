@@ -8,14 +8,16 @@ from typing import Any
 import moderngl
 
 from fsid.render.canvas import Canvas
+from fsid.render.mip_levels import MipLevels
 
 
 class ShadowAtlas:
     """One depth image that holds the tiles of all lights, and its moments at half the size."""
 
-    def __init__(self, context: moderngl.Context, drain: Callable[[], None]) -> None:
+    def __init__(self, context: moderngl.Context, drain: Callable[[], None], mips: MipLevels) -> None:
         """drain: called when an image was freed, so that the driver does not hold it (`Drain.run`)."""
         self._context = context
+        self._mips = mips
         self._drain = drain
         self._size = (0, 0)
         self._owned: list[Any] = []
@@ -54,7 +56,7 @@ class ShadowAtlas:
 
     def end_moments(self) -> None:
         """Make their mip levels."""
-        self._moments.build_mipmaps()
+        self._mips.fill(self._moments)
 
     def use(self, compare_unit: int, moments_unit: int) -> None:
         """Bind depth for filtered comparison, and the moments."""

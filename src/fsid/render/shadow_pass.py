@@ -12,6 +12,7 @@ from fsid.render.buffers import Buffers
 from fsid.render.exposure import Shot
 from fsid.render.frustum import in_view, sees
 from fsid.render.geometry import draw_commands
+from fsid.render.mip_levels import MipLevels
 from fsid.render.programs import ScreenProgram, load_program, set_uniforms
 from fsid.render.quality import Quality
 from fsid.render.shadow_atlas import ShadowAtlas
@@ -22,7 +23,7 @@ from fsid.render.targets import Targets
 
 class ShadowPass:
     """Owns the atlas. taps: the texture of `fsid.render.quality.tap_table`. grid, compute: as in `Targets`.
-    drain: as in `ShadowAtlas`."""
+    drain, mips: as in `ShadowAtlas`."""
 
     def __init__(
         self,
@@ -31,13 +32,14 @@ class ShadowPass:
         grid: int,
         taps: moderngl.Texture,
         drain: Callable[[], None],
+        mips: MipLevels,
         *,
         compute: bool,
     ) -> None:
         self._context = context
         self._quality = quality
         self._taps = taps
-        self._atlas = ShadowAtlas(context, drain)
+        self._atlas = ShadowAtlas(context, drain, mips)
         self._depth = load_program(context, "depth.vert", None)
         self._moments = ScreenProgram(context, "moments.frag", compute=compute)
         self._blocks = ScreenProgram(context, "shadow_blocks.frag", compute=compute, LENS=0, GRID=grid)

@@ -13,6 +13,8 @@ from fsid.errors import FsidError
 from fsid.render.canvas import Canvas, make_marks
 from fsid.render.context import gl
 from fsid.render.frame import Frame
+from fsid.render.mip_levels import MipLevels
+from fsid.render.programs import ScreenProgram
 
 _ID_LEVELS = 65535
 _STRIP = 64  # rows read at once
@@ -25,10 +27,12 @@ class Targets:
     compute: whether the programs that fill them are compute shaders. What `begin_...` returns is to be drawn.
     """
 
-    def __init__(self, context: moderngl.Context, grid: int, *, compute: bool) -> None:
+    def __init__(self, context: moderngl.Context, grid: int, mips: MipLevels, *, compute: bool) -> None:
         self._context = context
         self._grid = grid
+        self._mips = mips
         self._compute = compute
+        self._empty = ScreenProgram(context, "no_samples.frag", compute=True) if compute else None
         self._owned: list[Any] = []
         self._results: list[Canvas] = []
         self._lit: list[Canvas] = []
@@ -73,9 +77,12 @@ class Targets:
 
     def begin_samples(self, *, over: bool) -> None:
         """Draw the G-buffer, from nothing; or only what lies in front of the depth that is there."""
+        if self._empty is not None:
+            self._empty.draw(Canvas(self._context, [self._samples]))
         self._to_samples.use()
-        clear = gl("glClearBufferuiv", c_uint, c_int, c_void_p)  # glClear is undefined for integers
-        clear(_COLOUR, 0, (c_uint * 4)())
+        if self._empty is None:
+            clear = gl("glClearBufferuiv", c_uint, c_int, c_void_p)  # glClear is undefined for integers
+            clear(_COLOUR, 0, (c_uint * 4)())
         if not over:
             gl("glClearBufferfv", c_uint, c_int, c_void_p)(_DEPTH, 0, (c_float * 1)(1.0))
 
@@ -147,7 +154,7 @@ class Targets:
     def use_mirror(self, unit: int) -> None:
         """Bind radiance and depth, with mip levels, for what reflects them."""
         radiance = self._results[0].images[0]
-        radiance.build_mipmaps()
+        self._mips.fill(radiance)
         radiance.use(unit)
 
     def begin_marks(self) -> Canvas:
@@ -197,10 +204,11 @@ class Targets:
 
     def _strips(self, image: int, dtype: str, kind: type) -> Iterator[tuple[slice, np.ndarray]]:
         """(rows, (h, W, 4) texels) of an image of the result: together they would be the largest thing that a
-        frame needs."""
+        frame needs. A GPU would be waited for as often."""
         width, height = self.size
-        for first in range(0, height, _STRIP):
-            rows = min(_STRIP, height - first)
+        strip = height if self._compute else _STRIP
+        for first in range(0, height, strip):
+            rows = min(strip, height - first)
             data = self._results[0].read((0, first, width, rows), 4, image, dtype)
             yield slice(first, first + rows), np.frombuffer(data, kind).reshape(rows, width, 4)
 

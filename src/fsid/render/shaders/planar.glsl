@@ -34,14 +34,20 @@ vec3 mirror_image(sampler2D image, vec4 plane, Sample p, vec3 r, float alpha, bo
     return textureLod(image, moved, log2(max(texels, 1.0))).rgb;
 }
 
-// `room`, what a point mirrors of its surroundings in direction r, with the images over it where it lies in a
-// mirror's plane.
+// `room`, what a point mirrors of its surroundings in direction r, with the image of a mirror over it where it lies in
+// the mirror's plane.
+vec3 with_mirror(sampler2D image, vec4 plane, vec3 room, Sample p, vec3 r, float alpha) {
+    bool inside = abs(dot(p.position, plane.xyz) - plane.w) < 0.002 && dot(p.face_normal, plane.xyz) > 0.999;
+    float share = inside ? 1.0 - smoothstep(0.12, 0.25, alpha) : 0.0;
+    vec3 shown = mirror_image(image, plane, p, r, alpha, share > 0.0);
+    return share > 0.0 ? mix(room, shown, share) : room;    // there may be no such mirror
+}
+
+// With all of them: no loop, because some drivers take the wrong image where it is not written out.
 vec3 with_mirrors(vec3 room, Sample p, vec3 r, float alpha) {
-    for (int i = 0; i < PLANAR; ++i) {
-        vec4 plane = mirror_planes[i];
-        bool inside = abs(dot(p.position, plane.xyz) - plane.w) < 0.002 && dot(p.face_normal, plane.xyz) > 0.999;
-        float share = inside ? 1.0 - smoothstep(0.12, 0.25, alpha) : 0.0;
-        room = mix(room, mirror_image(mirror_images[i], plane, p, r, alpha, share > 0.0), share);
-    }
+    room = with_mirror(mirror_images[0], mirror_planes[0], room, p, r, alpha);
+#if PLANAR > 1
+    room = with_mirror(mirror_images[1], mirror_planes[1], room, p, r, alpha);
+#endif
     return room;
 }

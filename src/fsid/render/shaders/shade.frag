@@ -11,6 +11,7 @@
 #include "surfaces.glsl"
 #include "material.glsl"
 #include "lights.glsl"
+#include "moments.glsl"
 #include "shadows.glsl"
 #include "room.glsl"
 #include "lens.glsl"

@@ -4,6 +4,7 @@
 #include "screen.glsl"
 #include "encoding.glsl"
 #include "lights.glsl"
+#include "moments.glsl"
 #include "shadows.glsl"
 #include "lens.glsl"
 layout(binding = 0) uniform usampler2D samples;

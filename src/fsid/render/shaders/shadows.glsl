@@ -1,7 +1,6 @@
 // Share of a light that arrives: soft shadows from the atlas of fsid.render.shadows. Loops test at their end, as
 // in lights.glsl.
 layout(binding = 2) uniform sampler2DShadow shadow_compare;
-layout(binding = 3) uniform sampler2D shadow_moments;   // means of u and u^2, half the size, with mips
 layout(binding = 7) uniform sampler2D tap_table;        // row 0: search, row 1: filter; unit disc
 uniform int search_taps;
 uniform int filter_taps;
@@ -80,7 +79,7 @@ struct Field {
 Field field_at(Receiver r, vec2 offset, float width) {
     vec2 inside = r.to_atlas * min(width, 0.5 * r.tile_size);
     vec2 uv = clamp(r.centre + r.to_atlas * offset, r.corner + inside, r.corner + r.to_atlas * r.tile_size - inside);
-    vec2 moments = textureLod(shadow_moments, uv, log2(max(width / (2.0 * r.texel), 1.0))).xy;
+    vec2 moments = moments_at(uv, log2(max(width / (2.0 * r.texel), 1.0)));
     return Field(moments, r.u + dot(r.slope, (uv - r.centre) / r.to_atlas));
 }
 
