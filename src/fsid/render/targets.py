@@ -204,13 +204,16 @@ class Targets:
 
     def _strips(self, image: int, dtype: str, kind: type) -> Iterator[tuple[slice, np.ndarray]]:
         """(rows, (h, W, 4) texels) of an image of the result: together they would be the largest thing that a
-        frame needs. A GPU would be waited for as often."""
+        frame needs. A GPU would be waited for as often, so from there they are read at once."""
         width, height = self.size
-        strip = height if self._compute else _STRIP
-        for first in range(0, height, strip):
-            rows = min(strip, height - first)
-            data = self._results[0].read((0, first, width, rows), 4, image, dtype)
-            yield slice(first, first + rows), np.frombuffer(data, kind).reshape(rows, width, 4)
+        read = height if self._compute else _STRIP
+        for top in range(0, height, read):
+            count = min(read, height - top)
+            data = self._results[0].read((0, top, width, count), 4, image, dtype)
+            texels = np.frombuffer(data, kind).reshape(count, width, 4)
+            for first in range(0, count, _STRIP):
+                strip = texels[first : first + _STRIP]
+                yield slice(top + first, top + first + len(strip)), strip
 
     def release_glass(self) -> None:
         """Free what only `begin_glass` needs."""
