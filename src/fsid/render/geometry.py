@@ -77,38 +77,35 @@ class Geometry:
 
 def merge(drawables: Sequence[Drawable], layer_of: Callable[[Material], Layer], time_s: float) -> Geometry:
     """One geometry of all drawables at a time; `layer_of` tells where a material's maps are."""
-    vertices, world, indices, surfaces, ranges, spheres = [], [], [], [], [], []
-    first_vertex = first_index = first_surface = 0
-    for drawable in drawables:
-        index, mesh_surface, faces = _by_surface(drawable.mesh)
-        positions, normals = _in_world(drawable, index, time_s)
-        mesh_vertices = np.empty(len(positions), VERTEX)
-        mesh_vertices["normal"] = normals
-        clear = np.array([m.transmission >= CLEAR for m in drawable.materials], np.uint32)
-        mesh_vertices["surface"] = (mesh_surface + first_surface) | (clear[mesh_surface] << 31)
-        vertices.append(mesh_vertices)
-        world.append(positions)
-        indices.append(faces + np.uint32(first_vertex))
-        columns = drawable.mesh.vertices.T
-        low, high = (np.array([f(column) for column in columns]) for f in (np.min, np.max))
-        thickness_m = _GLASS_SHARE * (high - low).min() * min(drawable.transform.scale)
-        surfaces += [
-            _surface(drawable, material, layer_of(material), thickness_m, time_s)
-            for material in drawable.materials
-        ]
-        ranges.append((first_index, len(faces)))
-        spheres.append(_sphere(drawable, low, high, time_s))
-        first_vertex += len(mesh_vertices)
-        first_index += len(faces)
-        first_surface += len(drawable.materials)
-    return Geometry(
-        world=np.concatenate(world),
-        vertices=np.concatenate(vertices),
-        indices=np.concatenate(indices),
-        surfaces=np.stack(surfaces),
-        ranges=np.array(ranges, np.uint32),
-        spheres=np.array(spheres),
+    shapes = {mesh: _shape_of(mesh) for mesh in {drawable.mesh for drawable in drawables}}
+    shape_of = [shapes[drawable.mesh] for drawable in drawables]
+    whole = Geometry(
+        world=np.empty((sum(len(shape.points) for shape in shape_of), 3), np.float32),
+        vertices=np.empty(sum(len(shape.points) for shape in shape_of), VERTEX),
+        indices=np.empty(sum(len(shape.indices) for shape in shape_of), np.uint32),
+        surfaces=np.empty(sum(len(drawable.materials) for drawable in drawables), SURFACE),
+        ranges=np.empty((len(drawables), 2), np.uint32),
+        spheres=np.empty((len(drawables), 4)),
     )
+    vertex = index = number = 0
+    for i, (drawable, shape) in enumerate(zip(drawables, shape_of, strict=True)):
+        rows, last = slice(vertex, vertex + len(shape.points)), index + len(shape.indices)
+        rotation, position = drawable.pose(time_s)
+        _to_world(drawable, shape, (rotation, position), whole.world[rows], whole.vertices["normal"][rows])
+        clear = np.array([m.transmission >= CLEAR for m in drawable.materials], np.uint32)
+        numbers = np.arange(number, number + len(clear), dtype=np.uint32) | clear << 31
+        whole.vertices["surface"][rows] = numbers.take(shape.part)
+        np.add(shape.indices, np.uint32(vertex), out=whole.indices[index:last])
+        thickness_m = _GLASS_SHARE * (shape.high - shape.low).min() * min(drawable.transform.scale)
+        for material in drawable.materials:
+            surface = _surface(drawable, material, layer_of(material), thickness_m)
+            surface["place"][:, :3], surface["place"][:, 3] = rotation, position
+            whole.surfaces[number] = surface
+            number += 1
+        whole.ranges[i] = index, len(shape.indices)
+        whole.spheres[i] = _sphere(drawable, shape, (rotation, position))
+        vertex, index = rows.stop, last
+    return whole
 
 
 def surface_texels(surfaces: np.ndarray) -> np.ndarray:
@@ -132,35 +129,56 @@ def draw_commands(ranges: np.ndarray, visible: np.ndarray) -> np.ndarray:
     return commands
 
 
-def _by_surface(mesh: Mesh) -> tuple[np.ndarray | None, np.ndarray, np.ndarray]:
-    """(which vertices, their parts, indices): a vertex of two parts is doubled. None: all as they are."""
+@dataclass(frozen=True, eq=False)
+class _Shape:
+    """A mesh as it is drawn. points, normals: (V, 3) float32, twice where a vertex is of two parts.
+
+    part: (V,) uint32. indices: (3 F,) uint32. low, high: (3,) corners of its box.
+    """
+
+    points: np.ndarray
+    normals: np.ndarray
+    part: np.ndarray
+    indices: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+
+def _shape_of(mesh: Mesh) -> _Shape:
+    low, high = (np.array([f(column) for column in mesh.vertices.T]) for f in (np.min, np.max))
     part = np.zeros(len(mesh.vertices), np.uint32)
-    part[mesh.faces] = mesh.face_parts[:, None]
-    if (part[mesh.faces] == mesh.face_parts[:, None]).all():
-        return None, part, mesh.faces.astype(np.uint32).ravel()
+    corners = mesh.faces.T
+    for corner in corners:
+        part[corner] = mesh.face_parts
+    if all((part.take(corner) == mesh.face_parts).all() for corner in corners):
+        indices = mesh.faces.astype(np.uint32).ravel()
+        return _Shape(mesh.vertices, mesh.normals, part, indices, low, high)
     key = mesh.faces.astype(np.int64) * len(mesh.part_names) + mesh.face_parts[:, None]
     unique, inverse = np.unique(key, return_inverse=True)
     index, part = np.divmod(unique, len(mesh.part_names))
-    return index, part.astype(np.uint32), inverse.astype(np.uint32).ravel()
+    points, normals = mesh.vertices[index], mesh.normals[index]
+    return _Shape(points, normals, part.astype(np.uint32), inverse.astype(np.uint32).ravel(), low, high)
 
 
-def _in_world(drawable: Drawable, index: np.ndarray | None, time_s: float) -> tuple[np.ndarray, np.ndarray]:
-    """(V, 3) float32 points rotation (points * scale) + position, and their unit normals."""
-    points, normals = drawable.mesh.vertices, drawable.mesh.normals
-    if index is not None:
-        points, normals = points[index], normals[index]
-    (rotation, position), scale = drawable.pose(time_s), np.array(drawable.transform.scale)
-    world = points @ (rotation * scale).astype(np.float32).T + position.astype(np.float32)
-    turned = normals @ (rotation / scale).astype(np.float32).T
-    turned /= np.maximum(np.sqrt(np.einsum("ij,ij->i", turned, turned))[:, None], np.float32(1e-20))
-    return world, turned
+def _to_world(
+    drawable: Drawable,
+    shape: _Shape,
+    pose: tuple[np.ndarray, np.ndarray],
+    world: np.ndarray,
+    normals: np.ndarray,
+) -> None:
+    """Into `world` and `normals` (V, 3): points rotation (points * scale) + position, and unit normals."""
+    (rotation, position), scale = pose, np.array(drawable.transform.scale)
+    np.matmul(shape.points, (rotation * scale).astype(np.float32).T, out=world)
+    world += position.astype(np.float32)
+    turned = shape.normals @ (rotation / scale).astype(np.float32).T
+    length = np.sqrt(np.einsum("ij,ij->i", turned, turned))[:, None]
+    np.divide(turned, np.maximum(length, np.float32(1e-20)), out=normals)
 
 
-def _surface(
-    drawable: Drawable, material: Material, layer: Layer, thickness_m: float, time_s: float
-) -> np.ndarray:
+def _surface(drawable: Drawable, material: Material, layer: Layer, thickness_m: float) -> np.ndarray:
+    """A row of the table, without its place."""
     surface = np.zeros((), SURFACE)
-    surface["place"][:, :3], surface["place"][:, 3] = drawable.pose(time_s)
     surface["tiles_per_m"] = 1.0 / material.tile_m
     surface["colour_a"], surface["colour_b"], surface["colour_c"] = material.colours
     turn = np.radians(material.rotation_deg)
@@ -189,10 +207,8 @@ _SMOOTHEST = 0.18
 """MIN_ROUGHNESS in shaders/material.glsl: bounds the highlights of lights without size."""
 
 
-def _sphere(
-    drawable: Drawable, low: np.ndarray, high: np.ndarray, time_s: float
-) -> tuple[float, float, float, float]:
-    scale = np.array(drawable.transform.scale)
-    rotation, position = drawable.pose(time_s)
-    x, y, z = (float(c) for c in rotation @ ((low + high) / 2 * scale) + position)
-    return (x, y, z, float(np.linalg.norm((high - low) * scale) / 2))
+def _sphere(drawable: Drawable, shape: _Shape, pose: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    """(4,) world centre and radius."""
+    (rotation, position), scale = pose, np.array(drawable.transform.scale)
+    middle = rotation @ ((shape.low + shape.high) / 2 * scale) + position
+    return np.array([*middle, np.linalg.norm((shape.high - shape.low) * scale) / 2])
