@@ -13,7 +13,9 @@ import numpy as np
 from fsid.scene.colour import LUMINANCE
 from fsid.scene.model import Camera
 
+_LUMINANCE = LUMINANCE.astype(np.float32)
 _STRIDE = 4
+_STRIP = 32  # rows at once: what is in between stays in the cache
 _RANGE = (np.float32(1e-3), np.float32(1e2))
 """Of luminance relative to its median; what is darker or lighter takes the factor of these."""
 
@@ -25,9 +27,15 @@ def set_colour_contrast(radiance: np.ndarray, camera: Camera) -> None:
     """
     if not any(camera.colour_contrast):
         return
-    luminance = radiance @ LUMINANCE.astype(np.float32)
-    middle = np.median(luminance[::_STRIDE, ::_STRIDE])
-    if middle > 0:
-        logs = np.log(np.clip(luminance / middle, *_RANGE))  # numpy's power takes three times as long
+    middle = np.median((radiance[::_STRIDE] @ _LUMINANCE)[:, ::_STRIDE])
+    if not middle > 0:
+        return
+    for first in range(0, len(radiance), _STRIP):
+        strip = radiance[first : first + _STRIP]
+        logs = strip @ _LUMINANCE
+        logs /= middle
+        np.clip(logs, *_RANGE, out=logs)
+        np.log(logs, out=logs)  # numpy's power takes three times as long
         for colour, extra in zip((0, 2), camera.colour_contrast, strict=True):
-            radiance[..., colour] *= np.exp(np.float32(extra) * logs)
+            factor = np.float32(extra) * logs
+            strip[..., colour] *= np.exp(factor, out=factor)
