@@ -10,6 +10,8 @@ Labels are green's. docs/results/renderer.md has what that costs beside shading 
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import reduce
+from itertools import pairwise
 
 import numpy as np
 
@@ -21,7 +23,7 @@ _REACH = 4
 """Pixels on either side that are interpolated."""
 _BEYOND = np.float32(0.25)
 """Share of the least and of the greatest value around by which an interpolated one may lie beyond it."""
-_STRIP = 64  # rows interpolated at once: what is in between stays in the cache
+_STRIP = 32  # rows interpolated at once: what is in between stays in the cache
 
 
 def with_margin(camera: Camera) -> tuple[Camera, int]:
@@ -70,10 +72,11 @@ def magnified(radiance: np.ndarray, camera: Camera, margin: int) -> np.ndarray:
     inner = radiance[inside(camera, margin)].copy()
     for colour, growth in zip((0, 2), camera.chromatic_aberration, strict=True):
         plane = np.ascontiguousarray(radiance[..., colour])
-        rows, columns = (_places(size, growth) + margin for size in (camera.height, camera.width))
-        for first in range(0, len(rows), _STRIP):
-            strip = slice(first, first + _STRIP)
-            inner[strip, :, colour] = _interpolated(_interpolated(plane, rows[strip], 0), columns, 1)
+        rows, columns = (_taps(_places(size, growth) + margin) for size in (camera.height, camera.width))
+        for top in range(0, camera.height, _STRIP):
+            strip = slice(top, top + _STRIP)
+            high = _interpolated(plane, *(each[..., strip] for each in rows))
+            inner[strip, :, colour] = _interpolated(high.T, *columns).T
     return inner
 
 
@@ -83,18 +86,36 @@ def _places(size: int, growth: float) -> np.ndarray:
     return (np.arange(size) - middle) / (1 + growth) + middle
 
 
-def _interpolated(plane: np.ndarray, places: np.ndarray, axis: int) -> np.ndarray:
-    """`plane` (H, W), 0 or more, at `places` along an axis."""
-    first = np.floor(places).astype(int)
+def _taps(places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(P,) int numbers of the first lines that `places` are interpolated from, and (2 _REACH, P) weights of
+    those and the next."""
+    before = np.floor(places).astype(int)
     steps = np.arange(1 - _REACH, _REACH + 1)
-    away = (places - first)[:, None] - steps
+    away = (places - before)[:, None] - steps
     weights = np.sinc(away) * np.sinc(away / _REACH)
     weights = (weights / weights.sum(1, keepdims=True)).astype(np.float32)
-    total: np.ndarray | float = 0.0
-    least, most = np.float32(np.inf), np.float32(-np.inf)
-    for step, weight in zip(steps, weights.T, strict=True):
-        value = np.take(plane, np.clip(first + step, 0, plane.shape[axis] - 1), axis)
-        total = total + value * (weight[:, None] if axis == 0 else weight)
-        if -1 <= step <= 2:
-            least, most = np.minimum(least, value), np.maximum(most, value)
-    return np.asarray(np.clip(total, (1 - _BEYOND) * least, (1 + _BEYOND) * most))
+    return before + steps[0], np.ascontiguousarray(weights.T)
+
+
+def _interpolated(plane: np.ndarray, first: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """(P, W): lines of `plane` (H, W), 0 or more, by the `_taps` of P places, ascending.
+
+    Neighbours are interpolated from neighbours, but for few places where one is skipped or taken twice: what
+    lies between two of those is computed at once, without picking lines one by one.
+    """
+    source = np.arange(first[0], first[-1] + 2 * _REACH)
+    is_inside = source[0] >= 0 and source[-1] < len(plane)
+    lines = plane[source[0] : source[-1] + 1] if is_inside else plane[source.clip(0, len(plane) - 1)]
+    out = np.empty_like(lines, shape=(len(first), plane.shape[1]))
+    breaks = np.flatnonzero(np.diff(first) != 1) + 1
+    for start, stop in pairwise((0, *breaks, len(first))):
+        at, share = first[start] - first[0], weights[:, start:stop, None]
+        values = [lines[at + i : at + i + stop - start] for i in range(2 * _REACH)]
+        total = values[0] * share[0]
+        for i in range(1, 2 * _REACH):
+            total += values[i] * share[i]
+        near = values[_REACH - 2 : _REACH + 2]
+        least, most = reduce(np.minimum, near), reduce(np.maximum, near)
+        np.maximum(total, (1 - _BEYOND) * least, out=total)
+        np.minimum(total, (1 + _BEYOND) * most, out=out[start:stop])
+    return out
