@@ -15,6 +15,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict
+from functools import lru_cache
 from importlib.resources import files
 from itertools import pairwise
 from pathlib import Path
@@ -155,7 +156,9 @@ def _read(path: Path) -> str:
         raise FsidError(f"{path}: cannot read this profile as text: {error}") from error
 
 
+@lru_cache(maxsize=64)
 def _parse(text: str, where: str) -> CameraProfile:
+    """Kept, since every frame of a dataset asks for one; a file that has changed is another text."""
     data = parse_yaml(text, where)
     _check_keys(data, where, _REQUIRED, _OPTIONAL)
     white = _integer(data, "white_level", where, 1, 65535)
@@ -164,6 +167,9 @@ def _parse(text: str, where: str) -> CameraProfile:
     if white >= 2**bits:
         raise FsidError(f"{where}: white_level {white} does not fit into {bits} bits")
     iso, k, sigma2 = _levels(data["levels"], where, white - black)
+    matrices = _matrices(data, where)
+    for array in (k, sigma2, matrices):
+        array.setflags(write=False)
     cfa = data["cfa"] if data["cfa"] == MONO else check_cfa(data["cfa"], f"{where}: cfa")
     return CameraProfile(
         name=str(data["name"]),
@@ -175,7 +181,7 @@ def _parse(text: str, where: str) -> CameraProfile:
         iso=iso,
         k=k,
         sigma2=sigma2,
-        xyz_to_camera=_matrices(data, where),
+        xyz_to_camera=matrices,
         source=str(data.get("source", "")),
         notes=str(data.get("notes", "")),
         date=str(data.get("date", "")),
