@@ -85,7 +85,8 @@ class Attempt:
         """All samples of the frame, or what is wrong with it."""
         source = self._source(renderer)
         views = source.views
-        if not all(np.isfinite(image).all() for image in (views.truth, *views.seen)):
+        others = (image for image in views.seen if image is not views.truth)
+        if not all(np.isfinite(image).all() for image in (views.truth, *others)):
             return "not finite"
         shots = [self._shot(source, number) for number in range(self.config.exposures)]
         samples: list[Sample] = []
@@ -229,7 +230,7 @@ class _Shot:
         rng = np.random.default_rng(self.colour)
         if self.gains is None:
             return clean_from_photo(rng, image, self.profile)
-        return clean_from_linear(rng, image * self.gains, self.profile)
+        return clean_from_linear(rng, image, self.profile, self.gains)
 
 
 SAMPLE_KEY = re.compile(r"[0-9]{1,18}")

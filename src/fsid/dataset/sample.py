@@ -129,7 +129,7 @@ def to_uint8(srgb: np.ndarray) -> np.ndarray:
         return srgb
     if srgb.dtype.kind != "f":
         raise FsidError(f"a picture of {srgb.dtype} values: give sRGB values in 0..1, or 8-bit ones (uint8)")
-    if np.isnan(srgb).any():
+    if np.isnan(np.min(srgb, initial=0)):
         raise FsidError("a picture holds NaN; give sRGB values in 0..1")
     levels = np.clip(srgb, 0.0, 1.0)
     levels *= 255.0

@@ -19,21 +19,31 @@ from fsid.sensor.tone import srgb_encode
 
 _TURNED, _UPSIDE_DOWN, _MIRRORED = {5, 6, 7, 8}, {3, 4, 7, 8}, {2, 3, 6, 7}  # orientations
 
+_STRIP = 8  # rows at once: what is in between stays in the cache
+
 
 def develop(raw: Raw) -> np.ndarray:
     """Picture (H, W, 3) float32, sRGB-encoded 0..1, of a RAW of at least 4x4 pixels. No tone curve."""
-    return srgb_encode(develop_linear(raw))
+    picture, matrix = _camera_rgb(raw), camera_to_srgb_matrix(raw.xyz_to_camera)
+    for first in range(0, len(picture), _STRIP):
+        rows = slice(first, first + _STRIP)
+        picture[rows] = srgb_encode(apply_matrix(matrix, picture[rows]))
+    return picture
 
 
 def develop_linear(raw: Raw) -> np.ndarray:
     """Linear sRGB (H, W, 3) float32; 1 is sensor saturation, values below 0 and above 1 are kept."""
+    return apply_matrix(camera_to_srgb_matrix(raw.xyz_to_camera), _camera_rgb(raw))
+
+
+def _camera_rgb(raw: Raw) -> np.ndarray:
+    """(H, W, 3) float32, white-balanced."""
     gains = np.asarray(raw.white_balance, np.float32) / np.float32(min(raw.white_balance))
     balanced = raw.mosaic.astype(np.float32)
     for (r, c), channel in zip(site_offsets(raw.cfa), SITE_CHANNEL, strict=True):
         balanced[r::2, c::2] *= gains[channel]
     np.minimum(balanced, 1, out=balanced)
-    camera = demosaic(balanced, raw.cfa)
-    return apply_matrix(camera_to_srgb_matrix(raw.xyz_to_camera), camera)
+    return demosaic(balanced, raw.cfa)
 
 
 def upright(picture: np.ndarray, orientation: int) -> np.ndarray:

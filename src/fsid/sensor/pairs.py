@@ -30,6 +30,7 @@ if TYPE_CHECKING:  # RAW files are read and developed on machines without a grap
 PHOTO_EXPOSURE_MEAN = 0.8  # Brooks et al. 2019: brightness gain is 1 / N(0.8, 0.1)
 PHOTO_EXPOSURE_SIGMA = 0.1
 PHOTO_EXPOSURE_RANGE = (0.5, 1.1)
+_STRIP = 32  # rows at once, an even number: what is in between stays in the cache
 
 
 def clean_from_frame(rng: np.random.Generator, frame: Frame, profile: CameraProfile) -> Raw:
@@ -37,14 +38,28 @@ def clean_from_frame(rng: np.random.Generator, frame: Frame, profile: CameraProf
     return clean_from_linear(rng, expose(rng, frame.radiance), profile)
 
 
-def clean_from_linear(rng: np.random.Generator, linear_srgb: np.ndarray, profile: CameraProfile) -> Raw:
-    """Linear light (H, W, 3), 1 = saturation, seen through random colour of `profile`: float Raw in 0..1.
+def clean_from_linear(
+    rng: np.random.Generator,
+    linear_srgb: np.ndarray,
+    profile: CameraProfile,
+    exposure: np.ndarray | float = 1.0,
+) -> Raw:
+    """Linear light (H, W, 3) seen through random colour of `profile`: float Raw in 0..1.
 
-    An odd last row or column is dropped. FsidError for another shape, integers, NaN and infinity.
+    exposure: what takes the light, or each of its three colours, to units of saturation. An odd last row or
+    column is dropped. FsidError for another shape, integers, NaN and infinity.
     """
     check_linear(linear_srgb)
     matrix, gains = colour_rand(rng, profile.xyz_to_camera)
-    return _raw(linear_to_camera(_even(linear_srgb), matrix, gains), matrix, gains, profile)
+    image = _even(linear_srgb)
+    # NumPy takes eight times as long for three numbers per pixel as for a row of them.
+    row = np.ones((image.shape[1], 3), np.float32)
+    light, white_balance = row * exposure, row * np.asarray(gains, np.float32)
+    x = np.empty(image.shape[:2], np.float32)
+    for first in range(0, len(image), _STRIP):
+        rows = slice(first, first + _STRIP)
+        x[rows] = mosaic(linear_to_camera(image[rows] * light, matrix, white_balance), profile.cfa)
+    return _raw(x, matrix, gains, profile)
 
 
 def clean_from_photo(rng: np.random.Generator, srgb: np.ndarray, profile: CameraProfile) -> Raw:
@@ -55,7 +70,8 @@ def clean_from_photo(rng: np.random.Generator, srgb: np.ndarray, profile: Camera
     check_srgb(srgb)
     matrix, gains = colour_rand(rng, profile.xyz_to_camera)
     exposure = float(np.clip(rng.normal(PHOTO_EXPOSURE_MEAN, PHOTO_EXPOSURE_SIGMA), *PHOTO_EXPOSURE_RANGE))
-    return _raw(unprocess(_even(srgb), matrix, gains, exposure), matrix, gains, profile)
+    camera = unprocess(_even(srgb), matrix, gains, exposure)
+    return _raw(mosaic(camera, profile.cfa), matrix, gains, profile)
 
 
 def noisy_from_clean(
@@ -81,11 +97,9 @@ def noisy_from_clean(
     return replace(quantise(noisy) if terms.quantisation else noisy, iso=iso, noise=level)
 
 
-def _raw(
-    camera: np.ndarray, matrix: np.ndarray, gains: tuple[float, float, float], profile: CameraProfile
-) -> Raw:
+def _raw(x: np.ndarray, matrix: np.ndarray, gains: tuple[float, float, float], profile: CameraProfile) -> Raw:
     return Raw(
-        mosaic=mosaic(camera, profile.cfa),
+        mosaic=x,
         cfa=profile.cfa,
         black_level=profile.black_level,
         white_level=profile.white_level,

@@ -66,11 +66,12 @@ def process(
 
 
 def linear_to_camera(
-    linear_srgb: Any, xyz_to_camera: np.ndarray, white_balance: tuple[float, float, float]
+    linear_srgb: Any, xyz_to_camera: np.ndarray, white_balance: tuple[float, float, float] | np.ndarray
 ) -> Any:
     """Light in linear sRGB (H, W, 3), unbounded, to camera RGB (H, W, 3) float32 clipped to 0..1.
 
-    1 in grey light saturates green; red and blue, which white balance would amplify, saturate later.
+    white_balance: the gains, or a row of them, (W, 3). 1 in grey light saturates green; red and blue, which
+    white balance would amplify, saturate later.
     """
     camera = apply_matrix(srgb_to_camera_matrix(xyz_to_camera), linear_srgb)
     camera /= like(white_balance, camera)
