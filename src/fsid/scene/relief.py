@@ -13,6 +13,7 @@ from functools import lru_cache
 import numpy as np
 
 from fsid.assets import build_mesh
+from fsid.assets.surfaces import cross
 from fsid.scene.surroundings import Space
 
 CELL_M = 0.02
@@ -28,14 +29,15 @@ def surface_points(family: str, seed: int) -> np.ndarray:
     """(3, P) float32 points of a mesh, evenly by area, with some of its vertices and its extreme ones."""
     mesh = build_mesh(family, seed)
     vertices = mesh.vertices
-    a, b, c = (vertices[mesh.faces[:, k]] for k in range(3))
-    area = np.cumsum(np.linalg.norm(np.cross(b - a, c - a), axis=1))
+    a, b, c = (vertices.take(mesh.faces[:, k], axis=0) for k in range(3))
+    ab, ac = b - a, c - a
+    area = np.cumsum(np.linalg.norm(cross(ab, ac), axis=1))
     step = np.arange(_SPREAD_POINTS)
     face = np.searchsorted(area, (step + 0.5) / _SPREAD_POINTS * area[-1])
     # The R2 sequence (Roberts 2018): pairs that fill the square evenly, folded into a triangle.
     u, v = np.mod(0.5 + step * 0.7548776662466927, 1.0), np.mod(0.5 + step * 0.5698402909980532, 1.0)
     u, v = np.where(u + v > 1, (1 - u, 1 - v), (u, v))
-    spread = a[face] + u[:, None] * (b - a)[face] + v[:, None] * (c - a)[face]
+    spread = a[face] + u[:, None] * ab[face] + v[:, None] * ac[face]
     extreme = np.r_[vertices.argmin(0), vertices.argmax(0)]
     stride = max(1, len(vertices) // _VERTICES)
     points = np.concatenate([spread, vertices[::stride], vertices[extreme]])
