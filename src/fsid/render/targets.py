@@ -210,7 +210,7 @@ class Targets:
         for top in range(0, height, read):
             count = min(read, height - top)
             data = self._results[0].read((0, top, width, count), 4, image, dtype)
-            texels = np.frombuffer(data, kind).reshape(count, width, 4)
+            texels: np.ndarray = np.frombuffer(data, kind).reshape(count, width, 4)
             for first in range(0, count, _STRIP):
                 strip = texels[first : first + _STRIP]
                 yield slice(top + first, top + first + len(strip)), strip
