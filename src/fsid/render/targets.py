@@ -69,16 +69,17 @@ class Targets:
         for texture in images:
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._to_samples = context.framebuffer([self._samples], self._depth)
+        self._all_samples = Canvas(context, [self._samples])
         self._to_block_depth = Canvas(context, [self._block_depth])
         self._to_open = Canvas(context, [self._open])
         self._to_blurred = Canvas(context, [self._blurred])
         canvases = [self._to_block_depth, self._to_open, self._to_blurred, self._to_missing, self._to_marks]
-        self._owned = [self._to_samples, *canvases, self._marks, *images]
+        self._owned = [self._to_samples, self._all_samples, *canvases, self._marks, *images]
 
     def begin_samples(self, *, over: bool) -> None:
         """Draw the G-buffer, from nothing; or only what lies in front of the depth that is there."""
         if self._empty is not None:
-            self._empty.draw(Canvas(self._context, [self._samples]))
+            self._empty.draw(self._all_samples)
         self._to_samples.use()
         if self._empty is None:
             clear = gl("glClearBufferuiv", c_uint, c_int, c_void_p)  # glClear is undefined for integers
