@@ -27,7 +27,9 @@ def scene(seed: int, lens: Distortion | None = None, **config: object) -> Scene:
 
 def drawn(scenes: list[Scene], *, compute: bool, supersampling: int) -> list[Frame]:
     with Renderer(texture_size=64, supersampling=supersampling, compute=compute) as renderer:
-        return [renderer.render(each) for each in scenes]
+        frames = [renderer.render(each) for each in scenes]
+        assert renderer._context.error == "GL_NO_ERROR"
+        return frames
 
 
 def has_glass(which: Scene) -> bool:

@@ -126,6 +126,7 @@ class Renderer:
         self._overview = OverviewPass(context)
         self._occlusion = OcclusionPass(context, quality, grid, self._taps, compute=compute)
         self._shade = ShadePass(context, quality, grid, self._shadows, compute=compute)
+        self._idle = context.simple_framebuffer((1, 1))
 
     @property
     def _label_sample(self) -> float:
@@ -252,6 +253,7 @@ class Renderer:
             self._draw_light(stage, buffers, shot, [(mirror.plane, targets) for mirror, targets in images])
             mark("shading")
         finally:
+            self._idle.use()  # moderngl binds the last one again later: it must not be one that is freed
             buffers.release()
             for targets in self._mirror_targets:
                 targets.release()
