@@ -50,7 +50,7 @@ class ShadowAtlas:
         self.framebuffer.clear(depth=1.0)
 
     def begin_moments(self) -> Canvas:
-        """Draw moments, of half the size, from the depth, which unit 0 holds."""
+        """The moments, of half the size; unit 0 holds the depth that they are made of."""
         self._depth.use(0)
         return self._to_moments
 

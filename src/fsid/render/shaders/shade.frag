@@ -5,7 +5,7 @@
 // GRID: edge of the square of samples per pixel. LOBES: 1 with clearcoat, sheen and translucency. AREAS: 1 with
 // area lights. GLASS: 1 in the second pass, whose samples are glass alone and which looks what is behind up in
 // the result of the first. OWN: 0 leaves lights out whose shadow is not interpolated and marks the pixel, 1
-// adds those lights alone, 2 is both at once. PLANAR: 1 with an image of the scene as smooth ground in z = 0 reflects it.
+// adds those lights alone, 2 is both at once. PLANAR: how many mirrors may have an image.
 #include "screen.glsl"
 #include "encoding.glsl"
 #include "surfaces.glsl"
