@@ -91,18 +91,19 @@ def test_mip_levels_are_those_of_the_driver(size: tuple[int, int], components: i
 
 
 def test_a_layer_by_way_of_a_buffer_is_the_same() -> None:
-    texels = np.random.default_rng(5).integers(0, 256, (level_ranges(64)[-1][1].stop, 4), np.uint8)
+    """All its mip levels, each from its place in the buffer."""
+    levels = level_ranges(64)
+    texels = np.random.default_rng(5).integers(0, 256, (levels[-1][1].stop, 4), np.uint8)
+    read = gl("glGetTexImage", c_uint, c_int, c_uint, c_uint, c_void_p)
     with Renderer() as renderer:
-        found = []
         for buffered in (False, True):
             array = TextureArray(renderer._context, 64, 3, buffered=buffered)
             array.write(1, texels)
             array.use(0)
-            found.append(np.zeros((3, 64, 64, 4), np.uint8))
-            read = gl("glGetTexImage", c_uint, c_int, c_uint, c_uint, c_void_p)
-            read(0x8C1A, 0, 0x1908, 0x1401, found[-1].ctypes.data)
-    np.testing.assert_array_equal(found[1][1], texels[:4096].reshape(64, 64, 4))
-    np.testing.assert_array_equal(found[0][1], found[1][1])
+            for number, (size, level) in enumerate(levels):
+                found = np.zeros((3, size, size, 4), np.uint8)
+                read(0x8C1A, number, 0x1908, 0x1401, found.ctypes.data)
+                np.testing.assert_array_equal(found[1], texels[level].reshape(size, size, 4))
 
 
 def test_the_exact_filter_is_the_filter_of_the_driver() -> None:
