@@ -168,6 +168,22 @@ def test_own_profile_by_path(tmp_path):
     assert profile.xyz_to_camera.shape == (4, 3, 3)
 
 
+def test_a_profile_is_shared_and_cannot_be_written_to_until_its_file_changes(tmp_path):
+    path = tmp_path / "mine.yaml"
+    four, frames = "[1.0, 1.0, 1.0, 1.0]", "frames: 2\n    dark_frames: 2"
+    measured = f"    k_error: {four}\n    sigma2_error: {four}\n    black: {four}\n    {frames}\n"
+    path.write_text(GOOD[: GOOD.index("  - iso: 400")] + measured)
+    profile = load_profile(path)
+    assert load_profile(path) is profile
+    errors = profile.measured
+    arrays = [profile.k, profile.sigma2, profile.xyz_to_camera]
+    for array in [*arrays, errors.k_error, errors.sigma2_error, errors.black]:
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 0
+    path.write_text(GOOD)
+    assert len(load_profile(path).iso) == 2
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [

@@ -50,7 +50,10 @@ def profile_names() -> tuple[str, ...]:
 
 
 def load_profile(name_or_path: str | Path) -> CameraProfile:
-    """A built-in profile by name, or a YAML file by path; FsidError names the file and key that is wrong."""
+    """A built-in profile by name, or a YAML file by path; FsidError names the file and key that is wrong.
+
+    Its arrays are read-only: who loads the same file may get the same object.
+    """
     if str(name_or_path) in profile_names():
         text = (files("fsid.sensor") / "profiles" / f"{name_or_path}.yaml").read_text(encoding="utf-8")
     else:
@@ -167,8 +170,9 @@ def _parse(text: str, where: str) -> CameraProfile:
     if white >= 2**bits:
         raise FsidError(f"{where}: white_level {white} does not fit into {bits} bits")
     iso, k, sigma2 = _levels(data["levels"], where, white - black)
-    matrices = _matrices(data, where)
-    for array in (k, sigma2, matrices):
+    matrices, measured = _matrices(data, where), _measurement(data["levels"], where)
+    errors = () if measured is None else (measured.k_error, measured.sigma2_error, measured.black)
+    for array in (k, sigma2, matrices, *errors):
         array.setflags(write=False)
     cfa = data["cfa"] if data["cfa"] == MONO else check_cfa(data["cfa"], f"{where}: cfa")
     return CameraProfile(
@@ -185,7 +189,7 @@ def _parse(text: str, where: str) -> CameraProfile:
         source=str(data.get("source", "")),
         notes=str(data.get("notes", "")),
         date=str(data.get("date", "")),
-        measured=_measurement(data["levels"], where),
+        measured=measured,
         terms=parse_terms(data.get("terms", {}), f"{where}: terms"),
         optics=_optics(data["optics"], f"{where}: optics") if "optics" in data else None,
     )
