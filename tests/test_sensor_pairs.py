@@ -100,3 +100,11 @@ def test_a_photo_of_bytes_is_refused():
 def test_what_is_no_light_is_refused(light: np.ndarray, words: str):
     with pytest.raises(FsidError, match=words):
         clean_from_linear(np.random.default_rng(0), light, load_profile("pixel6"))
+
+
+@pytest.mark.parametrize("exposure", [np.inf, np.array([1.0, np.nan, 1.0], np.float32)])
+def test_an_exposure_without_bounds_is_refused(exposure: np.ndarray | float):
+    """As that of light so weak that its inverse is no number: it would make a RAW of NaN."""
+    light = np.full((4, 4, 3), 1e-41, np.float32)
+    with pytest.raises(FsidError, match="exposure of linear light must be finite"):
+        clean_from_linear(np.random.default_rng(0), light, load_profile("pixel6"), exposure)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fsid.errors import FsidError
 from fsid.sensor.colour import colour_rand
 from fsid.sensor.exposure import expose
 from fsid.sensor.mosaic import mosaic
@@ -47,9 +48,11 @@ def clean_from_linear(
     """Linear light (H, W, 3) seen through random colour of `profile`: float Raw in 0..1.
 
     exposure: what takes the light, or each of its three colours, to units of saturation. An odd last row or
-    column is dropped. FsidError for another shape, integers, NaN and infinity.
+    column is dropped. FsidError for another shape, integers, NaN and infinity in either.
     """
     check_linear(linear_srgb)
+    if not np.isfinite(exposure).all():
+        raise FsidError(f"the exposure of linear light must be finite; got {exposure}")
     matrix, gains = colour_rand(rng, profile.xyz_to_camera)
     image = _even(linear_srgb)
     # NumPy takes eight times as long for three numbers per pixel as for a row of them.
