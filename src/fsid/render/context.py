@@ -22,7 +22,7 @@ from fsid.errors import FsidError
 REQUIRED_VERSION = 430
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3
 _LARGE_BYTES, _KEPT_BYTES = 2**20, 2**26
-_MOST_BYTES = 2**25  # glibc's largest threshold
+_MOST_BYTES, _ALL_BYTES = 2**25, 2**30  # glibc's largest threshold for large blocks; more than is ever free
 _MAX_DEVICES = 16
 _SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swiftshader")
 _HELP = (
@@ -128,7 +128,7 @@ def keep_blocks() -> None:
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
     if mallopt is not None:
         mallopt(_M_MMAP_THRESHOLD, _MOST_BYTES)
-        mallopt(_M_TRIM_THRESHOLD, 2**30)
+        mallopt(_M_TRIM_THRESHOLD, _ALL_BYTES)
 
 
 def return_free_blocks() -> None:

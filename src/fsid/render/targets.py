@@ -69,12 +69,14 @@ class Targets:
         for texture in images:
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._to_samples = context.framebuffer([self._samples], self._depth)
-        self._all_samples = Canvas(context, [self._samples])
         self._to_block_depth = Canvas(context, [self._block_depth])
         self._to_open = Canvas(context, [self._open])
         self._to_blurred = Canvas(context, [self._blurred])
         canvases = [self._to_block_depth, self._to_open, self._to_blurred, self._to_missing, self._to_marks]
-        self._owned = [self._to_samples, self._all_samples, *canvases, self._marks, *images]
+        self._owned = [self._to_samples, *canvases, self._marks, *images]
+        if self._compute:
+            self._all_samples = Canvas(context, [self._samples])
+            self._owned.append(self._all_samples)
 
     def begin_samples(self, *, over: bool) -> None:
         """Draw the G-buffer, from nothing; or only what lies in front of the depth that is there."""
@@ -205,7 +207,7 @@ class Targets:
 
     def _strips(self, image: int, dtype: str, kind: type) -> Iterator[tuple[slice, np.ndarray]]:
         """(rows, (h, W, 4) texels) of an image of the result: together they would be the largest thing that a
-        frame needs. A GPU would be waited for as often, so from there they are read at once."""
+        frame needs. Beside compute shaders, on a GPU, they are read at once: each part is waited for."""
         width, height = self.size
         read = height if self._compute else _STRIP
         for top in range(0, height, read):
