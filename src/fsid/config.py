@@ -69,7 +69,7 @@ def _strict_choice(value: Any, kind: Any) -> str:
     """YAML reads an unquoted on and off as true and false."""
     word = ("off", "on")[value] if isinstance(value, bool) else value
     if word not in get_args(kind):
-        raise ValueError(f"{value!r} is not one of {', '.join(get_args(kind))}")
+        raise ValueError(f"{value!r} is not one of {', '.join(map(str, get_args(kind)))}")
     return word
 
 

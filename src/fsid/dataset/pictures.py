@@ -120,7 +120,8 @@ def read_exr(path: Path) -> np.ndarray:
     pixels = np.stack(colours, axis=-1).astype(np.float32)
     height, width = (size // 2 * 2 for size in pixels.shape[:2])
     if min(height, width) < SMALLEST_PX:
-        raise FsidError(f"{path}: is {pixels.shape[1]}x{pixels.shape[0]} pixels, at least 32x32 are needed")
+        needed = f"at least {SMALLEST_PX}x{SMALLEST_PX} are needed"
+        raise FsidError(f"{path}: is {pixels.shape[1]}x{pixels.shape[0]} pixels, {needed}")
     if not np.isfinite(pixels).all():
         raise FsidError(f"{path}: holds NaN or infinite values; render it again")
     return pixels[:height, :width].clip(min=0)

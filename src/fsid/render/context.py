@@ -116,19 +116,21 @@ def return_large_blocks() -> None:
     """Have glibc give freed blocks of a MiB and more back at once: the frames' arrays, each scene's of
     another size, would leave holes that hold a tenth more memory. Of what small blocks leave free, 64 MiB
     stay: every pass needs them again, and fresh pages cost a tenth of a frame. Elsewhere nothing happens."""
-    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
-    if mallopt is not None:
-        mallopt(_M_MMAP_THRESHOLD, _LARGE_BYTES)
-        mallopt(_M_TRIM_THRESHOLD, _KEPT_BYTES)
+    _set_malloc(_LARGE_BYTES, _KEPT_BYTES)
 
 
 def keep_blocks() -> None:
-    """Have glibc keep what is freed: beside a GPU every core draws frames of its own, and fresh pages of a
-    virtual machine cost more than the memory is worth. Elsewhere nothing happens."""
+    """Have glibc keep what is freed, because the next frame needs it again: for processes beside a GPU, where
+    the processor is scarcer than memory. Elsewhere nothing happens."""
+    _set_malloc(_MOST_BYTES, _ALL_BYTES)
+
+
+def _set_malloc(mapped_bytes: int, kept_bytes: int) -> None:
+    """From which size on blocks are mapped one by one, and how much that is free is kept."""
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
     if mallopt is not None:
-        mallopt(_M_MMAP_THRESHOLD, _MOST_BYTES)
-        mallopt(_M_TRIM_THRESHOLD, _ALL_BYTES)
+        mallopt(_M_MMAP_THRESHOLD, mapped_bytes)
+        mallopt(_M_TRIM_THRESHOLD, kept_bytes)
 
 
 def return_free_blocks() -> None:

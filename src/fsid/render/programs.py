@@ -26,7 +26,7 @@ def load_program(context: moderngl.Context, vertex: str, fragment: str | None) -
 
 class ScreenProgram:
     """Finds each pixel of a `Canvas` once: a fragment shader over one triangle, or the same file as a compute
-    shader, which GPUs for datacenters run on thirty times as many cores.
+    shader, which GPUs for datacenters run on more of their cores (docs/results/renderer.md).
 
     source: a file that includes shaders/screen.glsl, which explains its defines. marks: 0; 1 marks pixels of
     the canvas; 2 draws marked ones alone. adds: to what is there instead of replacing it. defines: its own.
