@@ -125,6 +125,61 @@ def test_a_patch_is_an_isometry_of_the_image_in_rggb_geometry(
     assert len(symmetries) == 8
 
 
+@pytest.mark.parametrize("cfa", CFA_PATTERNS)
+@pytest.mark.parametrize("shrink", [2, 4])
+def test_a_smaller_image_is_the_same_scene_in_rggb_geometry(cfa: str, shrink: int, tmp_path: Path) -> None:
+    """A pixel of a slope in light tells where the middle of what it covers lies in the stored image."""
+    height, width = 96, 112
+    slope = (128 * np.arange(height)[:, None] + np.arange(width)).astype(np.uint16)
+    config = replace(CONFIG, size_px=5, batch=32, shrink=(shrink,))
+    patches = PatchDataset(write_dataset(tmp_path, [raw(slope, cfa)]), config, seed=1)
+    colours = np.array(list(cfa)).reshape(2, 2)
+    directions = set()
+    for patch in patches[0].clean.numpy():
+        view = np.empty((10, 10))
+        for site, (r, c) in zip(patch * 65535.0, ((0, 0), (0, 1), (1, 0), (1, 1)), strict=True):
+            view[r::2, c::2] = site
+        number = (view - 129 * (shrink - 1) / 2) / shrink  # 128 row + column of the smaller image
+        np.testing.assert_allclose(number, np.rint(number), atol=0.01)
+        place = np.stack(np.divmod(np.rint(number).astype(int), 128), -1)
+        down, right = place[1, 0] - place[0, 0], place[0, 1] - place[0, 0]
+        i, j = np.mgrid[:10, :10]
+        np.testing.assert_array_equal(place, place[0, 0] + i[..., None] * down + j[..., None] * right)
+        assert (colours[place[:2, :2, 0] % 2, place[:2, :2, 1] % 2] == [["R", "G"], ["G", "B"]]).all()
+        directions.add((*down, *right))
+    assert len(directions) == 8
+
+
+def test_sizes_take_turns_and_each_has_its_epochs(tmp_path: Path) -> None:
+    """48 rows and 70 columns: fifteen cells of 14 pixels as it is, two at half the size."""
+    level = np.arange(48 * 70, dtype=np.uint16).reshape(48, 70)
+    config = replace(CONFIG, size_px=6, batch=2, shrink=(1, 2))
+    patches = PatchDataset(write_dataset(tmp_path, [raw(level)]), config, seed=1)
+    assert patches.patches == 15 + 2
+    large, small = zip(*(patches[step].clean.numpy() * 65535 for step in range(15)), strict=True)
+    assert len({round(float(patch.min())) for patch in large}) == 15
+    assert all(np.ptp(patch) > 1.5 * np.ptp(large[0]) for patch in small)
+    columns = [(float(patch.mean()) - 35) % 70 for patch in small]  # where the middle of a patch lies
+    for one, other in ((0, 1), (2, 3), (4, 5)):
+        assert abs(columns[one] - columns[other]) == pytest.approx(28, abs=3)
+
+
+@pytest.mark.parametrize("shrink", [(), (3,), (0,), (2, 2), (-2,)])
+def test_sizes_are_different_powers_of_two(shrink: tuple[int, ...]) -> None:
+    with pytest.raises(FsidError, match="powers of 2"):
+        replace(CONFIG, shrink=shrink)
+
+
+def test_stored_noise_is_of_the_size_it_was_made_for() -> None:
+    with pytest.raises(FsidError, match="stored noise"):
+        replace(CONFIG, shrink=(2,), noise="stored")
+
+
+def test_images_too_small_for_a_size_are_named(dataset: Path) -> None:
+    with pytest.raises(FsidError, match=r"60x40 made 2 times smaller, .* \(needs 68x68\)"):
+        PatchDataset(dataset, replace(CONFIG, shrink=(1, 2)), seed=0)
+
+
 def test_noise_follows_the_profile_and_the_converter(tmp_path: Path) -> None:
     grey = raw(np.full((HEIGHT, WIDTH), 0.2 * 61376 + 4096), black=4096, white=65472)
     config = replace(CONFIG, batch=64, profiles=("pixel6",), iso_min=3200, iso_max=3200)

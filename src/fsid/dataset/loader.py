@@ -3,14 +3,17 @@
     noisy = DN(clean + sqrt(k clean + sigma2 - r) n),    n ~ N(0, 1),    DN: round and clip as the camera's
     converter does, which adds r = 1/12 DN^2
 
-**Epochs.** A mosaic is cut into a grid of patches, which starts elsewhere in every epoch, and all patches of
-all mosaics come in a random order (`order`). With W ranks of batch B, the places of an epoch are dealt out in
-turn:
+**Epochs.** A mosaic is cut into a grid of patches, and those of all mosaics come in a random order (`grid`).
+With W ranks of batch B, the places of an epoch are dealt out in turn:
 
     place = (step W + rank) B + slot
 
 So no patch comes twice in an epoch, on whatever ranks and with any number of loading processes; no rank has
 more than another, however the images lie in the shards; and a resumed training goes on where it was.
+
+**Sizes.** Images may be made smaller first (`fsid.sensor.mosaic.halved`, before noise is drawn): what fills a
+patch of a large image then takes a small part of one. With several factors every one has epochs of its own,
+and they take turns.
 
 **Flips.** A packed RAW hides where its four sites lie inside the 2x2 tile. Mirroring the packed planes keeps
 their names but moves R from the left of Gr to its right: edges between planes jump by a pixel, and the
@@ -37,13 +40,13 @@ import torch
 from torch import Tensor
 from torch.utils.data import Dataset
 
+from fsid.dataset.grid import Cell, Grid, check_shrink
 from fsid.dataset.index import StoredMosaic, index_mosaics
 from fsid.dataset.levels import LevelTable
-from fsid.dataset.order import mixed, shuffled
 from fsid.errors import FsidError
 from fsid.sensor.formula import stored, with_noise
 from fsid.sensor.gaussian import standard_normal
-from fsid.sensor.mosaic import site_offsets
+from fsid.sensor.mosaic import halved, site_offsets
 from fsid.sensor.profiles import CameraProfile, load_bayer_profile
 from fsid.sensor.quantise import ROUNDING_DN2
 from fsid.sensor.raw import NoiseLevel
@@ -73,6 +76,7 @@ class PatchConfig:
     noise is drawn, by name or file. iso_min, iso_max: log-uniform range. held_out: so many images at the end
     of the dataset are not drawn, nor others of their scenes; they are for validation. noise: "fresh" draws it
     anew every time; "stored" takes the noisy images of the dataset, and profiles and ISO play no part.
+    shrink: how many times smaller images are made, powers of 2; as many patches of each.
     """
 
     size_px: int
@@ -82,12 +86,16 @@ class PatchConfig:
     iso_max: float
     held_out: int = 0
     noise: Noise = "fresh"
+    shrink: tuple[int, ...] = (1,)
 
     def __post_init__(self) -> None:
         if self.size_px < 1 or self.batch < 1:
             raise FsidError(f"size_px {self.size_px}, batch {self.batch}: must be at least 1")
         if self.noise not in get_args(Noise):
             raise FsidError(f"noise: {self.noise!r} is not one of {', '.join(get_args(Noise))}")
+        check_shrink(self.shrink)
+        if self.noise == "stored" and self.shrink != (1,):
+            raise FsidError(f"shrink {list(self.shrink)}: stored noise is of the images as they are")
 
 
 class PatchDataset(Dataset[Batch]):
@@ -124,18 +132,7 @@ class PatchDataset(Dataset[Batch]):
         self._levels = LevelTable(self._profiles, (config.iso_min, config.iso_max))
         self._config, self._seed = config, seed
         self._maps: OrderedDict[Path, np.ndarray] = OrderedDict()
-        self._pitch = (
-            2 * config.size_px + 2
-        )  # one tile more than the patch, for the shift of a mirrored window
-        grids = np.array([(m.height // self._pitch, m.width // self._pitch) for m in self._mosaics])
-        for mosaic, cells in zip(self._mosaics, grids, strict=True):
-            if not cells.all():
-                raise FsidError(
-                    f"{mosaic.shard}: {mosaic.key} is {mosaic.width}x{mosaic.height}, too small for patches "
-                    f"of {config.size_px} packed pixels (needs {self._pitch}x{self._pitch}); lower it"
-                )
-        self._columns = grids[:, 1]
-        self._ends = np.cumsum(grids.prod(1))
+        self._grids = [Grid(self._mosaics, config.size_px, shrink) for shrink in config.shrink]
 
     @property
     def mosaics(self) -> int:
@@ -144,8 +141,8 @@ class PatchDataset(Dataset[Batch]):
 
     @property
     def patches(self) -> int:
-        """How many patches an epoch has, all ranks together."""
-        return int(self._ends[-1])
+        """How many patches an epoch has, of images of all sizes and all ranks together."""
+        return sum(grid.patches for grid in self._grids)
 
     def empty_batch(self) -> Batch:
         """Memory for a batch, not filled yet."""
@@ -168,33 +165,34 @@ class PatchDataset(Dataset[Batch]):
             cameras, k[:], sigma2[:] = self._levels.draw_rand(rng, config.batch)
         first = (step * self._world + self._rank) * config.batch
         for slot in range(config.batch):
-            mosaic, corner = self._patch_at(first + slot)
-            cut, is_transposed = window_rand(rng, mosaic, corner, config.size_px)
-            packed(self._pixels(mosaic), mosaic, cut, clean[slot])
+            position, turn = divmod(first + slot, len(self._grids))
+            cell = self._grids[turn].cell(position, self._seed)
+            corner, pixels = self._seen(cell)
+            cut, is_transposed = window_rand(rng, cell.mosaic, corner, config.size_px)
+            packed(pixels, cell.mosaic, cut, clean[slot])
             if config.noise == "fresh":
                 noisy[slot] = _exposed(rng, clean[slot], k[slot], sigma2[slot], self._profiles[cameras[slot]])
             else:
-                capture, level = self._noisy[mosaic.key]
+                capture, level = self._noisy[cell.mosaic.key]
                 packed(self._pixels(capture), capture, cut, noisy[slot])
                 level = _transposed(level) if is_transposed else level
                 k[slot], sigma2[slot] = level.k, level.sigma2
 
-    def _patch_at(self, position: int) -> tuple[StoredMosaic, tuple[int, int]]:
-        """Which patch comes at a position of the whole training: mosaic and top left corner of its cell."""
-        epoch, place = divmod(position, self.patches)
-        number = shuffled(place, self.patches, self._seed, epoch)
-        at = int(np.searchsorted(self._ends, number, side="right"))
-        mosaic = self._mosaics[at]
-        cell = number - (int(self._ends[at - 1]) if at else 0)
-        chance = mixed(self._seed, epoch, at)
-        corner = []
-        for index, size in zip(
-            divmod(cell, int(self._columns[at])), (mosaic.height, mosaic.width), strict=True
-        ):
-            free = size % self._pitch
-            chance, start = divmod(chance, free + 1)
-            corner.append(start + index * self._pitch)
-        return mosaic, (corner[0], corner[1])
+    def _seen(self, cell: Cell) -> tuple[tuple[int, int], np.ndarray]:
+        """The corner of a cell in DN of the image, or of the part around it made smaller; and these DN."""
+        pixels = self._pixels(cell.mosaic)
+        if cell.shrink == 1:
+            return cell.corner, pixels
+        reach = self._grids[0].pitch
+        first = [at // 2 * 2 for at in cell.corner]
+        rows, columns = (
+            slice(cell.shrink * start, cell.shrink * (start + reach + 2 * (at % 2)))
+            for start, at in zip(first, cell.corner, strict=True)
+        )
+        around = pixels[rows, columns]
+        for _ in range(cell.shrink.bit_length() - 1):
+            around = halved(around)
+        return (cell.corner[0] % 2, cell.corner[1] % 2), around
 
     def _pixels(self, mosaic: StoredMosaic) -> np.ndarray:
         if mosaic.shard not in self._maps:

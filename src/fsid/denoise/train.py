@@ -282,6 +282,7 @@ def _patch_config(config: TrainConfig, held_out_images: int) -> PatchConfig:
         iso_min=config.iso_min,
         iso_max=config.iso_max,
         held_out=held_out_images,
+        shrink=config.shrink,
     )
 
 

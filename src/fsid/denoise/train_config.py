@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Literal
 
 from fsid.config import load_settings
+from fsid.dataset.grid import check_shrink
 from fsid.denoise.raw_denoiser import MAX_PATCH_PX, NetworkConfig
 from fsid.errors import FsidError
 
@@ -21,18 +22,19 @@ _MAX_THREADS = 1024  # a system that runs out of them fails anywhere, with messa
 class TrainConfig:
     """How to train.
 
-    network: size of the NAFNet. initial_weights: a network to start from (fine-tuning), as a run folder,
-    a file or the name of a shipped one; "" starts from random weights. steps: of the optimizer. batch:
-    patches per step and process. patch_px: side of a patch in packed pixels (the mosaic patch has twice
-    that). learning_rate: peak; final_rate: end of the cosine as a share of it. warmup_steps: linear rise.
-    betas, weight_decay: of AdamW. clip_norm: largest gradient norm. ema_decay: of the moving average of
-    the weights, which is the model that is kept. profiles: cameras whose noise is drawn, by name or file.
-    iso_min, iso_max: log-uniform range. held_out: images at the end of the dataset that are for
-    validation, at most a fifth of it. validate_every: steps. validation_photos: a folder of photographs
-    to validate on as well ("" for none). seed: of weights, patches and noise. log_every,
-    checkpoint_every: steps. tensorboard: write its logs, where it is installed. compile: the network with
-    torch.compile; auto does on a GPU. threads: of PyTorch on a CPU, 0 leaves its own choice.
-    loader_processes: extra processes that prepare batches (0: none, right on a CPU).
+    network: size of the NAFNet. initial_weights: a network to start from (fine-tuning), as a run folder, a
+    file or the name of a shipped one; "" starts from random weights. steps: of the optimizer. batch: patches
+    per step and process. patch_px: side of a patch in packed pixels (the mosaic patch has twice that).
+    shrink: how many times smaller images are made before patches are cut, powers of 2, with as many patches
+    of each ([1, 2, 4] for large images, of which a patch shows little). learning_rate: peak; final_rate: end
+    of the cosine as a share of it. warmup_steps: linear rise. betas, weight_decay: of AdamW. clip_norm:
+    largest gradient norm. ema_decay: of the moving average of the weights, which is the model that is kept.
+    profiles: cameras whose noise is drawn, by name or file. iso_min, iso_max: log-uniform range. held_out:
+    images at the end of the dataset that are for validation, at most a fifth of it. validate_every: steps.
+    validation_photos: a folder of photographs to validate on as well ("" for none). seed: of weights, patches
+    and noise. log_every, checkpoint_every: steps. tensorboard: write its logs, where it is installed.
+    compile: the network with torch.compile; auto does on a GPU. threads: of PyTorch on a CPU, 0 leaves its
+    own choice. loader_processes: extra processes that prepare batches (0: none, right on a CPU).
     """
 
     network: NetworkConfig = field(default_factory=NetworkConfig)
@@ -40,6 +42,7 @@ class TrainConfig:
     steps: int = 200_000
     batch: int = 16
     patch_px: int = 64
+    shrink: tuple[int, ...] = (1,)
     learning_rate: float = 1e-3
     final_rate: float = 0.001
     warmup_steps: int = 1000
@@ -73,6 +76,7 @@ class TrainConfig:
         ):
             if getattr(self, key) > most:
                 raise FsidError(f"{key}: must be at most {most}, got {getattr(self, key)}")
+        check_shrink(self.shrink)
         for key in ("learning_rate", "final_rate", "weight_decay"):
             if not 0 <= getattr(self, key) < math.inf:
                 raise FsidError(f"{key}: must be finite and not negative, got {getattr(self, key)}")

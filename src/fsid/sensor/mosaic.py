@@ -68,6 +68,22 @@ def unpack(packed: Any, cfa: str) -> Any:
     return out
 
 
+def halved(mosaic: np.ndarray) -> np.ndarray:
+    """A mosaic half as large, of the same pattern: (4 h, 4 w) of any numbers to (2 h, 2 w) float32.
+
+    Each new pixel takes 3/4 of the nearest and 1/4 of the next old one of its colour along both axes, so that
+    the mean of their places is the middle of the 2 x 2 pixels that it covers.
+    """
+    if mosaic.shape[0] % 4 or mosaic.shape[1] % 4:
+        raise FsidError(f"mosaic of {mosaic.shape[1]}x{mosaic.shape[0]} pixels: multiples of 4 can be halved")
+    near, far = np.float32(0.75), np.float32(0.25)
+    fours = mosaic.reshape(-1, 4, mosaic.shape[1])
+    rows = np.stack([near * fours[:, 0] + far * fours[:, 2], far * fours[:, 1] + near * fours[:, 3]], axis=1)
+    fours = rows.reshape(len(mosaic) // 2, -1, 4)
+    columns = [near * fours[..., 0] + far * fours[..., 2], far * fours[..., 1] + near * fours[..., 3]]
+    return np.stack(columns, axis=-1).reshape(len(mosaic) // 2, -1)
+
+
 def bayer_crop(raw: Raw, top: int, left: int, height: int, width: int) -> Raw:
     """Crop to any pixel offset; the pattern of the result is the one its own first pixel sees.
 

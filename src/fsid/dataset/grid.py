@@ -1,0 +1,91 @@
+"""The patches of a dataset at one size of its images, and which of them comes at which place.
+
+    cells of a mosaic of H x W pixels = (H / shrink) // pitch by (W / shrink) // pitch
+
+The cells start elsewhere in every epoch, and those of all mosaics come in a random order (`order`). One tile
+more than a patch lies in a cell, for the shift of a mirrored window.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from fsid.dataset.index import StoredMosaic
+from fsid.dataset.order import mixed, shuffled
+from fsid.errors import FsidError
+
+
+@dataclass(frozen=True)
+class Cell:
+    """Where a patch is cut: corner (row, column) in pixels of `mosaic` made `shrink` times smaller."""
+
+    mosaic: StoredMosaic
+    corner: tuple[int, int]
+    shrink: int
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """The cells of all `mosaics`. size_px: side of a patch in packed pixels. FsidError where one is too
+    small for a patch."""
+
+    mosaics: tuple[StoredMosaic, ...]
+    size_px: int
+    shrink: int = 1
+
+    def __post_init__(self) -> None:
+        for mosaic, cells in zip(self.mosaics, self._cells, strict=True):
+            if not cells.all():
+                needed = self.pitch * self.shrink
+                smaller = f" made {self.shrink} times smaller" if self.shrink > 1 else ""
+                raise FsidError(
+                    f"{mosaic.shard}: {mosaic.key} is {mosaic.width}x{mosaic.height}{smaller}, too small for "
+                    f"patches of {self.size_px} packed pixels (needs {needed}x{needed}); lower it"
+                )
+
+    @property
+    def pitch(self) -> int:
+        """Pixels from one cell to the next."""
+        return 2 * self.size_px + 2
+
+    @property
+    def patches(self) -> int:
+        """How many an epoch has."""
+        return int(self._ends[-1])
+
+    def cell(self, position: int, seed: int) -> Cell:
+        """That at a position of the whole training, epoch after epoch."""
+        epoch, place = divmod(position, self.patches)
+        number = shuffled(place, self.patches, seed, epoch)
+        at = int(np.searchsorted(self._ends, number, side="right"))
+        mosaic = self.mosaics[at]
+        number -= int(self._ends[at - 1]) if at else 0
+        chance = mixed(seed, epoch, at)
+        corner = []
+        for index, size in zip(divmod(number, int(self._cells[at, 1])), self._size(mosaic), strict=True):
+            chance, start = divmod(chance, size % self.pitch + 1)
+            corner.append(start + index * self.pitch)
+        return Cell(mosaic, (corner[0], corner[1]), self.shrink)
+
+    def _size(self, mosaic: StoredMosaic) -> tuple[int, int]:
+        """(H, W) made smaller, whole tiles."""
+        return mosaic.height // self.shrink // 2 * 2, mosaic.width // self.shrink // 2 * 2
+
+    @cached_property
+    def _cells(self) -> np.ndarray:
+        """(M, 2) rows and columns of cells."""
+        return np.array([self._size(mosaic) for mosaic in self.mosaics]) // self.pitch
+
+    @cached_property
+    def _ends(self) -> np.ndarray:
+        return np.cumsum(self._cells.prod(1))
+
+
+def check_shrink(shrink: tuple[int, ...]) -> None:
+    """FsidError unless these are different powers of 2."""
+    powers = [factor for factor in shrink if factor > 0 and factor & (factor - 1) == 0]
+    if not shrink or len(set(powers)) < len(shrink):
+        raise FsidError(f"shrink {list(shrink)}: give different powers of 2, such as [1,2,4]")
