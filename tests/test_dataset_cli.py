@@ -256,6 +256,18 @@ def test_a_count_is_needed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     assert not (tmp_path / "out").exists()
 
 
+def test_gpus_that_are_not_there_are_missed_before_anything_is_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as exit_:
+        main(
+            ["generate", str(tmp_path / "out"), "--count", "1", "--workers", "999", "--workers-per-gpu", "1"]
+        )
+    assert exit_.value.code == 2
+    assert "GPU 998 is needed" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
 def test_the_papers_configuration_is_found_by_name_and_by_path() -> None:
     config = generate_config("fsid-175k")
     assert (config.width, config.height, config.variant) == (1920, 1080, "full")

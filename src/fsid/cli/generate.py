@@ -118,19 +118,24 @@ def generate(
     if dry_run:
         Console().print(_plan(out, settings, count, seed, workforce), soft_wrap=True)
     else:
-        if settings.images and not is_begun(out, dataset):
-            frames = -(-count // settings.pairs_per_frame)
-            _check_pictures(Path(settings.images), frames, workers, quiet=quiet)
+        if not is_begun(out, dataset):
+            _check_sources(settings, count, workforce, quiet=quiet)
         made = _make(out, settings, count, seed, workforce, quiet=quiet)
         console.print(f"{out}: {count} pairs, {made} of them new")
 
 
-def _check_pictures(folder: Path, frames: int, workers: int, *, quiet: bool) -> None:
-    """Those of so many frames, behind a progress bar, on as many cores as there are workers."""
+def _check_sources(settings: GenerateConfig, count: int, workforce: Workforce, *, quiet: bool) -> None:
+    """Before anything is written: the pictures of all frames, decoded on as many cores as there are workers,
+    or the GPUs of these."""
     from fsid.dataset import check_pictures, find_pictures
+    from fsid.render import gpu_device
 
-    with progress_bar(f"checking {folder}", "pictures", quiet=quiet) as progress:
-        check_pictures(find_pictures(folder)[:frames], min(workers, os.cpu_count() or 1), progress)
+    if settings.images:
+        pictures = find_pictures(Path(settings.images))[: -(-count // settings.pairs_per_frame)]
+        with progress_bar(f"checking {settings.images}", "pictures", quiet=quiet) as progress:
+            check_pictures(pictures, min(workforce.workers, os.cpu_count() or 1), progress)
+    elif workforce.workers_per_gpu and not workforce.ray and settings.renderer == "raster":
+        gpu_device((workforce.workers - 1) // workforce.workers_per_gpu)
 
 
 def _make(
