@@ -3,7 +3,7 @@
     noisy = DN(clean + sqrt(k clean + sigma2 - r) n),    n ~ N(0, 1),    DN: round and clip as the camera's
     converter does, which adds r = 1/12 DN^2
 
-**Epochs.** A mosaic is cut into a grid of patches, and those of all mosaics come in a random order (`grid`).
+**Epochs.** A mosaic is cut into a grid of patches, and those of all mosaics come in a random order (`cells`).
 With W ranks of batch B, the places of an epoch are dealt out in turn:
 
     place = (step W + rank) B + slot
@@ -40,7 +40,7 @@ import torch
 from torch import Tensor
 from torch.utils.data import Dataset
 
-from fsid.dataset.grid import Cell, Grid, check_shrink
+from fsid.dataset.cells import Cell, Grid, check_shrink
 from fsid.dataset.index import StoredMosaic, index_mosaics
 from fsid.dataset.levels import LevelTable
 from fsid.errors import FsidError

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Literal
 
 from fsid.config import load_settings
-from fsid.dataset.grid import check_shrink
+from fsid.dataset.cells import check_shrink
 from fsid.denoise.raw_denoiser import MAX_PATCH_PX, NetworkConfig
 from fsid.errors import FsidError
 
