@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from fsid.errors import FsidError
 from fsid.sensor import CFA_PATTERNS, Raw, bayer_crop, bayer_flip, mosaic, pack, unpack
-from fsid.sensor.mosaic import shift_cfa, site_offsets
+from fsid.sensor.mosaic import halved, shift_cfa, site_offsets
 
 cfas = st.sampled_from(CFA_PATTERNS)
 sides = st.integers(1, 9).map(lambda n: 2 * n)
@@ -112,3 +112,35 @@ def test_a_raw_is_equal_to_itself_alone():
     assert raw in [raw]
     assert len({raw, replace(raw, mosaic=raw.mosaic.copy())}) == 2
     assert raw not in [replace(raw, mosaic=raw.mosaic.copy())]
+
+
+def test_a_halved_mosaic_keeps_its_colours_apart() -> None:
+    colours = np.tile(np.array([[3, 5], [7, 11]], np.uint16), (6, 8))
+    half = halved(colours)
+    assert half.dtype == np.float32
+    np.testing.assert_array_equal(half, colours[:6, :8])
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_halved_mosaic_puts_everything_in_the_middle_of_what_it_covers(axis: int) -> None:
+    ramp = np.indices((12, 20))[axis].astype(np.uint16)
+    expected = 2 * np.indices((6, 10))[axis] + 0.5
+    np.testing.assert_array_equal(halved(ramp), expected)
+
+
+def test_a_halved_mosaic_keeps_the_light(rng: np.random.Generator) -> None:
+    """Every old pixel has a share in the new ones, of which there are a quarter as many."""
+    weights = np.zeros((16, 16))
+    for i in range(16):
+        for j in range(16):
+            one = np.zeros((16, 16), np.float32)
+            one[i, j] = 1
+            weights[i, j] = halved(one).sum()
+    assert weights.min() > 0.05
+    np.testing.assert_allclose(weights.mean(), 0.25)
+
+
+@pytest.mark.parametrize("shape", [(6, 8), (8, 10)])
+def test_only_whole_pairs_of_tiles_are_halved(shape: tuple[int, int]) -> None:
+    with pytest.raises(FsidError, match="multiples of 4"):
+        halved(np.zeros(shape))
