@@ -175,9 +175,18 @@ def test_stored_noise_is_of_the_size_it_was_made_for() -> None:
         replace(CONFIG, shrink=(2,), noise="stored")
 
 
-def test_images_too_small_for_a_size_are_named(dataset: Path) -> None:
-    with pytest.raises(FsidError, match=r"60x40 made 2 times smaller, .* \(needs 68x68\)"):
+def test_a_size_that_no_image_is_large_enough_for_is_refused(dataset: Path) -> None:
+    with pytest.raises(FsidError, match=r"60x40 to be made 2 times smaller, .* \(needs 68x68\)"):
         PatchDataset(dataset, replace(CONFIG, shrink=(1, 2)), seed=0)
+
+
+def test_images_that_are_too_small_are_only_drawn_as_they_are(tmp_path: Path) -> None:
+    images = [raw(np.full(shape, level)) for shape, level in (((36, 60), 9000), ((40, 60), 20000))]
+    config = replace(CONFIG, size_px=9, batch=2, shrink=(1, 2))
+    patches = PatchDataset(write_dataset(tmp_path, images), config, seed=1)
+    levels = np.array([patches[step].clean.mean((1, 2, 3)).numpy() * 65535 for step in range(12)])
+    assert {round(level, -2) for level in levels[:, 0].tolist()} == {9000, 20000}
+    assert {round(level, -2) for level in levels[:, 1].tolist()} == {20000}
 
 
 def test_noise_follows_the_profile_and_the_converter(tmp_path: Path) -> None:

@@ -29,22 +29,24 @@ class Cell:
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """The cells of all `mosaics`. size_px: side of a patch in packed pixels. FsidError where one is too
-    small for a patch."""
+    """The cells of all `mosaics`. size_px: side of a patch in packed pixels. FsidError where one is too small
+    for a patch as it is, or all are when made smaller; of these, those that are too small have no cells."""
 
     mosaics: tuple[StoredMosaic, ...]
     size_px: int
     shrink: int = 1
 
     def __post_init__(self) -> None:
-        for mosaic, cells in zip(self.mosaics, self._cells, strict=True):
-            if not cells.all():
-                needed = self.pitch * self.shrink
-                smaller = f" made {self.shrink} times smaller" if self.shrink > 1 else ""
-                raise FsidError(
-                    f"{mosaic.shard}: {mosaic.key} is {mosaic.width}x{mosaic.height}{smaller}, too small for "
-                    f"patches of {self.size_px} packed pixels (needs {needed}x{needed}); lower it"
-                )
+        fits = self._cells.all(1)
+        if fits.all() or (self.shrink > 1 and fits.any()):
+            return
+        mosaic = self.mosaics[int(np.argmin(fits))]
+        needed = self.pitch * self.shrink
+        smaller = f" to be made {self.shrink} times smaller" if self.shrink > 1 else ""
+        raise FsidError(
+            f"{mosaic.shard}: {mosaic.key} is {mosaic.width}x{mosaic.height}{smaller}, too small for patches "
+            f"of {self.size_px} packed pixels (needs {needed}x{needed}); lower it"
+        )
 
     @property
     def pitch(self) -> int:
