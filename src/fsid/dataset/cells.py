@@ -42,10 +42,12 @@ class Grid:
             return
         mosaic = self.mosaics[int(np.argmin(fits))]
         needed = self.pitch * self.shrink
-        smaller = f" to be made {self.shrink} times smaller" if self.shrink > 1 else ""
+        smaller, lower = "", "it"
+        if self.shrink > 1:
+            smaller, lower = f" to be made {self.shrink} times smaller", "it or shrink"
         raise FsidError(
             f"{mosaic.shard}: {mosaic.key} is {mosaic.width}x{mosaic.height}{smaller}, too small for patches "
-            f"of {self.size_px} packed pixels (needs {needed}x{needed}); lower it"
+            f"of {self.size_px} packed pixels (needs {needed}x{needed}); lower {lower}"
         )
 
     @property
