@@ -20,11 +20,27 @@ from fsid.errors import FsidError
 
 @dataclass(frozen=True)
 class Cell:
-    """Where a patch is cut: corner (row, column) in pixels of `mosaic` made `shrink` times smaller."""
+    """Where a patch is cut: `side` pixels each way from corner (row, column) of `mosaic` made `shrink` times
+    smaller."""
 
     mosaic: StoredMosaic
     corner: tuple[int, int]
+    side: int
     shrink: int
+
+    @property
+    def window(self) -> tuple[slice, slice]:
+        """Rows and columns of the stored mosaic: whole tiles around the cell."""
+        rows, columns = (
+            slice(self.shrink * (start - start % 2), self.shrink * (start + self.side + start % 2))
+            for start in self.corner
+        )
+        return rows, columns
+
+    @property
+    def corner_inside(self) -> tuple[int, int]:
+        """The corner in what lies in the window, made smaller."""
+        return self.corner[0] % 2, self.corner[1] % 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +88,7 @@ class Grid:
         for index, size in zip(divmod(number, int(self._cells[at, 1])), self._size(mosaic), strict=True):
             chance, start = divmod(chance, size % self.pitch + 1)
             corner.append(start + index * self.pitch)
-        return Cell(mosaic, (corner[0], corner[1]), self.shrink)
+        return Cell(mosaic, (corner[0], corner[1]), self.pitch, self.shrink)
 
     def _size(self, mosaic: StoredMosaic) -> tuple[int, int]:
         """(H, W) made smaller, whole tiles."""

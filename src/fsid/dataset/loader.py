@@ -167,32 +167,22 @@ class PatchDataset(Dataset[Batch]):
         for slot in range(config.batch):
             position, turn = divmod(first + slot, len(self._grids))
             cell = self._grids[turn].cell(position, self._seed)
-            corner, pixels = self._seen(cell)
-            cut, is_transposed = window_rand(rng, cell.mosaic, corner, config.size_px)
-            packed(pixels, cell.mosaic, cut, clean[slot])
+            cut, is_transposed = window_rand(rng, cell.mosaic, cell.corner_inside, config.size_px)
+            packed(self._around(cell, cell.mosaic), cell.mosaic, cut, clean[slot])
             if config.noise == "fresh":
                 noisy[slot] = _exposed(rng, clean[slot], k[slot], sigma2[slot], self._profiles[cameras[slot]])
             else:
                 capture, level = self._noisy[cell.mosaic.key]
-                packed(self._pixels(capture), capture, cut, noisy[slot])
+                packed(self._around(cell, capture), capture, cut, noisy[slot])
                 level = _transposed(level) if is_transposed else level
                 k[slot], sigma2[slot] = level.k, level.sigma2
 
-    def _seen(self, cell: Cell) -> tuple[tuple[int, int], np.ndarray]:
-        """The corner of a cell in DN of the image, or of the part around it made smaller; and these DN."""
-        pixels = self._pixels(cell.mosaic)
-        if cell.shrink == 1:
-            return cell.corner, pixels
-        reach = self._grids[0].pitch
-        first = [at // 2 * 2 for at in cell.corner]
-        rows, columns = (
-            slice(cell.shrink * start, cell.shrink * (start + reach + 2 * (at % 2)))
-            for start, at in zip(first, cell.corner, strict=True)
-        )
-        around = pixels[rows, columns]
+    def _around(self, cell: Cell, mosaic: StoredMosaic) -> np.ndarray:
+        """DN (H, W) of a mosaic of the cell's image: the tiles around the cell, made smaller as it says."""
+        pixels = self._pixels(mosaic)[cell.window]
         for _ in range(cell.shrink.bit_length() - 1):
-            around = halved(around)
-        return (cell.corner[0] % 2, cell.corner[1] % 2), around
+            pixels = halved(pixels)
+        return pixels
 
     def _pixels(self, mosaic: StoredMosaic) -> np.ndarray:
         if mosaic.shard not in self._maps:
