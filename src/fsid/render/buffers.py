@@ -7,18 +7,21 @@ from typing import Any
 import moderngl
 import numpy as np
 
+from fsid.render.canvas import use_texels
 from fsid.render.geometry import surface_texels
 from fsid.render.stage import Stage
 
 UNITS = {"room": 4, "surfaces": 5, "lights": 6, "sky": 10}
 """Texture units of the tables, as the shaders' `binding`s."""
+_TEXELS = ("surfaces", "lights")  # read texel by texel
 
 
 class Buffers:
-    """Made for one stage and released after it."""
+    """Made for one stage and released after it. compute: as in `Targets`."""
 
-    def __init__(self, context: moderngl.Context, stage: Stage) -> None:
+    def __init__(self, context: moderngl.Context, stage: Stage, *, compute: bool) -> None:
         self._context = context
+        self._compute = compute
         geometry, plan = stage.geometry, stage.plan
         self._world, self._vertices, self._indices = (
             context.buffer(array.view(np.uint8))
@@ -37,7 +40,10 @@ class Buffers:
     def use(self) -> None:
         """Bind all tables to their units."""
         for name, table in self._tables.items():
-            table.use(UNITS[name])
+            if name in _TEXELS:
+                use_texels(table, UNITS[name], compute=self._compute)
+            else:
+                table.use(UNITS[name])
 
     def vertex_array(self, program: moderngl.Program) -> moderngl.VertexArray:
         """The geometry as input of a program: positions in the world, and the rest where it is asked for."""

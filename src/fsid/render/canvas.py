@@ -1,4 +1,4 @@
-"""Images that one program fills together, and marks on their pixels."""
+"""Images that one program fills together, marks on their pixels, and images that it reads by texel."""
 
 from __future__ import annotations
 
@@ -54,6 +54,14 @@ class Canvas:
         """Free the framebuffer."""
         if self._framebuffer is not None:
             self._framebuffer.release()
+
+
+def use_texels(texture: moderngl.Texture, unit: int, *, compute: bool) -> None:
+    """Bind what a program declares with TEXELS or UINT_TEXELS of shaders/screen.glsl."""
+    if compute:
+        texture.use(unit)
+    else:
+        texture.bind_to_image(unit, read=True, write=False)
 
 
 def make_marks(context: moderngl.Context, size: tuple[int, int], *, compute: bool) -> Any:

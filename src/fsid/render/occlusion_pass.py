@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import moderngl
 
+from fsid.render.canvas import use_texels
 from fsid.render.exposure import Shot
 from fsid.render.programs import ScreenProgram
 from fsid.render.quality import Quality
@@ -18,6 +19,7 @@ class OcclusionPass:
         self, context: moderngl.Context, quality: Quality, grid: int, taps: moderngl.Texture, *, compute: bool
     ) -> None:
         self._taps = taps
+        self._compute = compute
         self._block_depth, self._occlusion, self._blur = (
             ScreenProgram(context, file, compute=compute)
             for file in ("block_depth.frag", "occlusion.frag", "blur.frag")
@@ -34,7 +36,7 @@ class OcclusionPass:
             size=targets.blocks,
             shift=shot.seen_shift,
         )
-        self._taps.use(7)
+        use_texels(self._taps, 7, compute=self._compute)
         self._occlusion.draw(targets.begin_occlusion())
         for back in (False, True):
             self._blur.set(direction=(0, 1) if back else (1, 0), size=targets.blocks)

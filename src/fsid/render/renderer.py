@@ -112,6 +112,7 @@ class Renderer:
 
     def _prepare(self, texture_size: int, compute: bool) -> None:
         context, quality, grid = self._context, self._quality, self._grid
+        self._compute = compute
         self._texture_size = texture_size
         self._drain = context.finish if self._on_gpu else Drain(context).run
         self._layers = self._new_layers(texture_size)
@@ -233,7 +234,7 @@ class Renderer:
         mark("scene build")
         self._targets.resize((view.camera.width, view.camera.height), shot.lens.seen_px)
         self._shadows.resize(stage.plan)
-        buffers = Buffers(self._context, stage)
+        buffers = Buffers(self._context, stage, compute=self._compute)
         stage = replace(stage, geometry=stage.geometry.without_vertices())
         try:
             mark("upload")

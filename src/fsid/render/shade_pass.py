@@ -105,7 +105,7 @@ class ShadePass:
             max_probes=self._quality.probes,
             vignetting=camera.vignetting,
         )
-        layers.use(0, 1)
+        layers.use(8, 9)
         self._shadows.use(program, stage.plan)
         self._reflectance.use(14)
         buffers.use()

@@ -9,6 +9,7 @@ import moderngl
 import numpy as np
 
 from fsid.render.buffers import Buffers
+from fsid.render.canvas import use_texels
 from fsid.render.exposure import Shot
 from fsid.render.frustum import in_view, sees
 from fsid.render.geometry import draw_commands
@@ -39,6 +40,7 @@ class ShadowPass:
         self._context = context
         self._quality = quality
         self._taps = taps
+        self._compute = compute
         self._atlas = ShadowAtlas(context, drain, mips)
         self._depth = load_program(context, "depth.vert", None)
         self._moments = ScreenProgram(context, "moments.frag", compute=compute)
@@ -101,8 +103,8 @@ class ShadowPass:
             search_taps=self._quality.search_taps,
             filter_taps=self._quality.filter_taps,
         )
-        self._atlas.use(compare_unit=2, moments_unit=3)
-        self._taps.use(7)
+        self._atlas.use(compare_unit=15, moments_unit=3)
+        use_texels(self._taps, 7, compute=self._compute)
 
 
 def _deepest_m(spheres: np.ndarray, shot: Shot) -> float:

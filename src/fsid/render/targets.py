@@ -10,7 +10,7 @@ import moderngl
 import numpy as np
 
 from fsid.errors import FsidError
-from fsid.render.canvas import Canvas, make_marks
+from fsid.render.canvas import Canvas, make_marks, use_texels
 from fsid.render.context import gl
 from fsid.render.frame import Frame
 from fsid.render.mip_levels import MipLevels
@@ -110,12 +110,12 @@ class Targets:
 
     def begin_block_depth(self) -> Canvas:
         """The depth of the blocks; unit 0 holds the G-buffer."""
-        self._samples.use(0)
+        self._use(self._samples, 0)
         return self._to_block_depth
 
     def begin_shadow_blocks(self, lights: int) -> Canvas:
         """The share of each light that reaches the blocks, of as many lights as an image is high; unit 0
-        holds the G-buffer, and unit 15 is the result for what is drawn next."""
+        holds the G-buffer, and unit 2 is the result for what is drawn next."""
         width, height = self.blocks
         fours = min(-(-lights // 4), self._limit // height)
         self.block_lights = min(lights, 4 * fours)
@@ -125,8 +125,8 @@ class Targets:
             texture = self._context.texture((width, rows), 4, dtype="f4")
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
             self._lit, self._lit_rows = [Canvas(self._context, [texture])], rows
-        self._lit[0].images[0].use(15)
-        self._samples.use(0)
+        self._use(self._lit[0].images[0], 2)
+        self._use(self._samples, 0)
         return self._lit[0]
 
     def _release_lit(self) -> None:
@@ -135,19 +135,19 @@ class Targets:
 
     def begin_occlusion(self) -> Canvas:
         """The occlusion; units 0, 1 hold the G-buffer and the depth of the blocks."""
-        self._samples.use(0)
-        self._block_depth.use(1)
+        self._use(self._samples, 0)
+        self._use(self._block_depth, 1)
         return self._to_open
 
     def begin_blur(self, *, back: bool) -> Canvas:
         """The occlusion of unit 0 in the second image, or back in the first."""
-        (self._blurred if back else self._open).use(0)
+        self._use(self._blurred if back else self._open, 0)
         return self._to_open if back else self._to_blurred
 
     def begin_shading(self) -> Canvas:
-        """The result; units 8, 9 hold the G-buffer and the occlusion."""
-        self._samples.use(8)
-        self._open.use(9)
+        """The result; units 0, 1 hold the G-buffer and the occlusion."""
+        self._use(self._samples, 0)
+        self._use(self._open, 1)
         return self._results[0]
 
     def begin_missing(self) -> Canvas:
@@ -161,7 +161,8 @@ class Targets:
         radiance.use(unit)
 
     def begin_marks(self) -> Canvas:
-        """New marks alone; unit 8 holds the G-buffer."""
+        """New marks alone; unit 0 holds the G-buffer."""
+        self._use(self._samples, 0)
         return self._to_marks
 
     def begin_glass(self) -> Canvas:
@@ -179,6 +180,9 @@ class Targets:
         for unit, texture in zip((11, 12, 13), self._results[1 - result].images, strict=True):
             texture.use(unit)
         return self._results[result]
+
+    def _use(self, texture: moderngl.Texture, unit: int) -> None:
+        use_texels(texture, unit, compute=self._compute)
 
     def read_radiance(self) -> tuple[np.ndarray, np.ndarray]:
         """(H, W, 3) radiance and (H, W) depth, inf where nothing was hit; row 0 at the top."""

@@ -1,6 +1,6 @@
 // What blocks of 2 x 2 pixels know, between their samples: openness (occlusion.frag), light (shadow_blocks.frag).
-layout(binding = 9) uniform sampler2D occlusion;     // openness, depth, surface from 1
-layout(binding = 15) uniform sampler2D lit_blocks;   // of shadow_blocks.frag
+TEXELS(1, rgba32f, occlusion);     // openness, depth, surface from 1
+TEXELS(2, rgba32f, lit_blocks);    // of shadow_blocks.frag
 uniform int block_lights;   // how many lights it holds
 
 const float LEAST_OWN = 0.3;   // share of the blocks around a point that must lie on its surface
@@ -17,7 +17,7 @@ struct Blocks {
 Blocks blocks_around(Sample p) {
     vec3 local = axes * (p.position - origin);
     vec2 at = 0.5 * (seen_at(local / local.z) - block_place(ivec2(0)));
-    ivec2 corner = ivec2(floor(at)), last = textureSize(occlusion, 0) - 1;
+    ivec2 corner = ivec2(floor(at)), last = EXTENT(occlusion) - 1;
     vec2 f = at - vec2(corner);
     Blocks b;
     b.even = all(greaterThanEqual(corner, ivec2(0))) && all(lessThan(corner, last));
@@ -26,7 +26,7 @@ Blocks blocks_around(Sample p) {
         vec2 near = mix(1.0 - f, f, vec2(cell));
         b.share[i] = near.x * near.y;
         b.at[i] = clamp(corner + cell, ivec2(0), last);
-        vec3 known = texelFetch(occlusion, b.at[i], 0).rgb;
+        vec3 known = FETCH(occlusion, b.at[i]).rgb;
         vec2 place = (vec2(block_texel(b.at[i])) + 0.5) / float(GRID);
         vec3 position = seen_ray(place) * known.y * axes + origin;
         b.open[i] = known.x;
@@ -55,11 +55,11 @@ float openness(Blocks b, float depth) {
 
 // Shares of four lights that arrive, between the blocks' samples; more than 1 where that must be found here.
 vec4 interpolated(Blocks b, int four) {
-    int row = four * textureSize(occlusion, 0).y;
+    int row = four * EXTENT(occlusion).y;
     bool any = b.own[0] + b.own[1] + b.own[2] + b.own[3] > 0.5;
     vec4 sum = vec4(0), most = vec4(any && 4 * four < block_lights ? 0.0 : 2.0);
     for (int i = 0; i < 4; ++i) {
-        vec4 lit = texelFetch(lit_blocks, b.at[i] + ivec2(0, row), 0);
+        vec4 lit = FETCH(lit_blocks, b.at[i] + ivec2(0, row));
         sum += b.own[i] * lit;
         most = max(most, b.own[i] > 0.0 ? lit : vec4(0));
     }

@@ -1,8 +1,8 @@
 #version 430 core
 // Openness (r) averaged along one image axis with binomial weights, among pixels of like depth (g). b: surface.
 #include "screen.glsl"
-layout(binding = 0) uniform sampler2D openness;
-layout(binding = 1) uniform sampler2D blocks;   // of block_depth.frag
+TEXELS(0, rgba32f, openness);
+TEXELS(1, rg32f, blocks);   // of block_depth.frag
 uniform ivec2 direction;
 uniform ivec2 size;
 OUTPUT(0, rgba32f, result);
@@ -13,14 +13,14 @@ const float TOLERANCE = 0.02;   // of the depth, per pixel of distance
 
 void main() {
     BEGIN(pixel);
-    vec2 centre = texelFetch(openness, pixel, 0).xy;
+    vec2 centre = FETCH(openness, pixel).xy;
     float sum = 0.0, total = 0.0;
     for (int i = -REACH; i <= REACH; ++i) {
-        vec2 o = texelFetch(openness, clamp(pixel + i * direction, ivec2(0), size - 1), 0).xy;
+        vec2 o = FETCH(openness, clamp(pixel + i * direction, ivec2(0), size - 1)).xy;
         float apart = abs(o.y - centre.y) / (TOLERANCE * max(centre.y, 1e-3) * (1.0 + abs(float(i))));
         float weight = WEIGHTS[abs(i)] * max(1.0 - apart * apart, 0.0);
         sum += weight * o.x;
         total += weight;
     }
-    WRITE(result, pixel, vec4(sum / total, centre.y, texelFetch(blocks, pixel, 0).g, 0.0));
+    WRITE(result, pixel, vec4(sum / total, centre.y, FETCH(blocks, pixel).g, 0.0));
 }

@@ -9,6 +9,6 @@ void main() {
     BEGIN(pixel);
     uint glass = 0u;
     for (int i = 0; i < COUNT; ++i)
-        glass |= texelFetch(samples, texel_seen(ray_at(place_of(pixel, i))), 0).z;
+        glass |= FETCH(samples, texel_seen(ray_at(place_of(pixel, i)))).z;
     MARK(pixel, glass != 0u);
 }

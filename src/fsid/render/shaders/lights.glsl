@@ -1,7 +1,7 @@
 // Lights: see fsid.render.shadows for the table and fsid.scene.model.Light for the units.
 // Loops test at their end: llvmpipe has no other jump than back, so that every other loop runs once more than
 // needed, and both sides of every branch run.
-layout(binding = 6) uniform sampler2D light_table;
+TEXELS(6, rgba32f, light_table);
 uniform int light_count;
 
 const int LIGHT_TEXELS = 8;
@@ -23,7 +23,7 @@ struct Light {
 
 Light light_at(int i) {
     vec4 t[LIGHT_TEXELS];
-    for (int k = 0; k < LIGHT_TEXELS; ++k) t[k] = texelFetch(light_table, ivec2(k, i), 0);
+    for (int k = 0; k < LIGHT_TEXELS; ++k) t[k] = FETCH(light_table, ivec2(k, i));
     return Light(t[0].xyz, t[0].w, t[1].xyz, t[1].w, t[2].w, t[2].rgb, t[3].xyz, t[4].xyz, t[3].w, t[4].w,
                  int(t[5].x), int(t[5].y), int(t[5].z), t[5].w, t[6].xyz, t[7].xyz);
 }

@@ -1,7 +1,7 @@
 // Material evaluation: box mapping in metres, blended where the surface turns from one axis to the next.
 // Loops test at their end, as in lights.glsl.
-layout(binding = 0) uniform sampler2DArray masks;    // mix, pattern, detail, roughness
-layout(binding = 1) uniform sampler2DArray relief;   // slope u, slope v, spread, metallic
+layout(binding = 8) uniform sampler2DArray masks;    // mix, pattern, detail, roughness
+layout(binding = 9) uniform sampler2DArray relief;   // slope u, slope v, spread, metallic
 uniform float max_probes;
 
 const float BLEND = 0.2;          // axes whose component is this close to the largest one are blended

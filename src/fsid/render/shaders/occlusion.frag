@@ -5,9 +5,9 @@
 // Output: openness 0..1, depth (0 = no hit).
 #include "screen.glsl"
 #include "encoding.glsl"
-layout(binding = 0) uniform usampler2D samples;
-layout(binding = 1) uniform sampler2D depth;    // metres, of the blocks; 0 = no hit
-layout(binding = 7) uniform sampler2D tap_table;   // row 2: where the spirals begin
+UINT_TEXELS(0, rgba32ui, samples);
+TEXELS(1, rg32f, depth);      // metres, of the blocks; 0 = no hit
+TEXELS(7, rg32f, tap_table);  // row 2: where the spirals begin
 uniform int stride;      // samples per block and axis
 uniform vec2 focal;      // half image sizes
 uniform vec2 shift;      // half image sizes
@@ -32,15 +32,15 @@ void main() {
     BEGIN(block);
     vec2 per_block, corner;
     plane_ahead(per_block, corner);
-    float z = texelFetch(depth, block, 0).r;
+    float z = FETCH(depth, block).r;
     bool hit = z > 0.0;
     vec3 p = vec3(vec2(block) * per_block + corner, 1.0) * z;
-    vec3 n = axes * unpack_direction(texelFetch(samples, block * stride + stride / 2, 0).y);
+    vec3 n = axes * unpack_direction(FETCH(samples, block * stride + stride / 2).y);
     float reach = min(0.5 * RADIUS_M * focal.x / max(z, 1e-3), MAX_SCREEN) * float(size.x);
     float r2 = RADIUS_M * RADIUS_M, sum = 0.0;
     float floor_m = 0.004 + 0.003 * z;
     int spiral = (block.x & 1) + 2 * (block.y & 1);
-    vec2 tap = texelFetch(tap_table, ivec2(spiral, 2), 0).xy;
+    vec2 tap = FETCH(tap_table, ivec2(spiral, 2)).xy;
     float radius = length(tap) * reach;
     vec2 direction = normalize(tap);
     int i = 0, count = hit ? taps : 0;
@@ -48,7 +48,7 @@ void main() {
         ivec2 other = clamp(block + ivec2(round(radius * direction)), ivec2(0), size - 1);
         direction = mat2(TURN.x, TURN.y, -TURN.y, TURN.x) * direction;
         radius += reach / float(taps);
-        float other_z = texelFetch(depth, other, 0).r;
+        float other_z = FETCH(depth, other).r;
         vec3 v = vec3(vec2(other) * per_block + corner, 1.0) * other_z - p;
         float vv = dot(v, v), f = max(r2 - vv, 0.0);
         sum += other_z > 0.0 ? f * f * f * max(dot(v, n) - floor_m, 0.0) / (vv + 0.0004) : 0.0;

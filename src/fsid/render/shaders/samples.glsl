@@ -1,5 +1,5 @@
 // The samples of a pixel, and those of them that are one surface: on one plane, of like normals.
-layout(binding = 8) uniform usampler2D samples;
+UINT_TEXELS(0, rgba32ui, samples);
 uniform mat3 axes;        // rows right, up, forward
 uniform vec3 origin;
 
@@ -21,7 +21,7 @@ ivec2 texel_seen(vec3 ray) { return clamp(ivec2(seen_at(ray) * float(GRID)), ive
 Sample sample_at(vec2 at) {
     vec3 ray = ray_at(at);
     ivec2 texel = texel_seen(ray);
-    uvec4 code = texelFetch(samples, texel, 0);
+    uvec4 code = FETCH(samples, texel);
     vec3 face_normal = unpack_direction(code.y);
     float depth = uintBitsToFloat(code.w);
 #if LENS > 0

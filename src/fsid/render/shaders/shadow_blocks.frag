@@ -7,7 +7,7 @@
 #include "moments.glsl"
 #include "shadows.glsl"
 #include "lens.glsl"
-layout(binding = 0) uniform usampler2D samples;
+UINT_TEXELS(0, rgba32ui, samples);
 uniform ivec2 blocks;
 uniform bool through;     // whether there are surfaces that pass light on
 uniform mat3 axes;        // rows right, up, forward
@@ -19,7 +19,7 @@ const float SLANTED = 0.05;   // cosine below which a surface is not followed fu
 void main() {
     BEGIN(at);
     ivec2 texel = block_texel(ivec2(at.x, at.y % blocks.y));
-    uvec4 code = texelFetch(samples, texel, 0);
+    uvec4 code = FETCH(samples, texel);
     vec3 ray = seen_ray((vec2(texel) + 0.5) / float(GRID)) * axes;
     vec3 n = unpack_direction(code.y);
     float depth = uintBitsToFloat(code.w);

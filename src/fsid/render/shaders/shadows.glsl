@@ -1,7 +1,7 @@
 // Share of a light that arrives: soft shadows from the atlas of fsid.render.shadows. Loops test at their end, as
 // in lights.glsl.
-layout(binding = 2) uniform sampler2DShadow shadow_compare;
-layout(binding = 7) uniform sampler2D tap_table;        // row 0: search, row 1: filter; unit disc
+layout(binding = 15) uniform sampler2DShadow shadow_compare;
+TEXELS(7, rg32f, tap_table);        // row 0: search, row 1: filter; unit disc
 uniform int search_taps;
 uniform int filter_taps;
 uniform float tile_px;
@@ -115,7 +115,7 @@ float visibility(Light light, vec3 position, vec3 face_normal, bool wanted, floa
     float width = 0.3 * r.search;
     int i = 0;
     do {
-        vec2 offset = search * texelFetch(tap_table, ivec2(i, 0), 0).xy;
+        vec2 offset = search * FETCH(tap_table, ivec2(i, 0)).xy;
         float lit = soft_lit(r, field_at(r, offset, width), blocked);
         shaded += i < taps ? 1.0 - lit : 0.0;
         blocked_sum += i < taps ? blocked : 0.0;
@@ -139,7 +139,7 @@ float visibility(Light light, vec3 position, vec3 face_normal, bool wanted, floa
     int sharp = filtered && soft < 1.0 ? filter_taps : 0;
     i = 0;
     do {
-        vec2 offset = spread * texelFetch(tap_table, ivec2(i, 1), 0).xy;
+        vec2 offset = spread * FETCH(tap_table, ivec2(i, 1)).xy;
         float limit = r.u + dot(r.slope, offset) + bias;
         sharp_sum += textureLod(shadow_compare, vec3(r.centre + r.to_atlas * offset, 1.0 - limit), 0.0);
     } while (++i < sharp);
@@ -147,7 +147,7 @@ float visibility(Light light, vec3 position, vec3 face_normal, bool wanted, floa
     int smooth_taps = filtered && soft > 0.0 ? filter_taps : 0;
     i = 0;
     do {
-        vec2 offset = spread * texelFetch(tap_table, ivec2(i, 1), 0).xy;
+        vec2 offset = spread * FETCH(tap_table, ivec2(i, 1)).xy;
         soft_sum += soft_lit(r, field_at(r, offset, 0.3 * wide), blocked);
     } while (++i < smooth_taps);
     float dim = 1.0 - soft_sum / float(filter_taps);

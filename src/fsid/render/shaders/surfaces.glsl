@@ -1,6 +1,6 @@
 // Table of surfaces (fsid.render.geometry.SURFACE): ten texels a surface, in blocks of SURFACE_ROWS rows. A
 // texture and not a buffer: llvmpipe reads a texel nine times as fast as a buffer element.
-layout(binding = 5) uniform sampler2D surface_table;
+TEXELS(5, rgba32f, surface_table);
 const int SURFACE_TEXELS = 10;
 const int SURFACE_ROWS = 2048;
 
@@ -21,7 +21,7 @@ struct Surface {
 Surface surface_at(int i) {
     ivec2 at = ivec2(SURFACE_TEXELS * (i / SURFACE_ROWS), i % SURFACE_ROWS);
     vec4 t[SURFACE_TEXELS];
-    for (int k = 0; k < SURFACE_TEXELS; ++k) t[k] = texelFetch(surface_table, at + ivec2(k, 0), 0);
+    for (int k = 0; k < SURFACE_TEXELS; ++k) t[k] = FETCH(surface_table, at + ivec2(k, 0));
     Surface s;
     for (int k = 0; k < 3; ++k) s.place[k] = t[k].xyz;
     s.position = vec3(t[0].w, t[1].w, t[2].w);
