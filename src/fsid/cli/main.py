@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import select
 import sys
 from collections.abc import Callable, Sequence
-from typing import NoReturn
+from typing import NoReturn, TextIO
 
 import tyro
 from rich.console import Console
@@ -63,7 +65,20 @@ EXTRAS = {
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run one command; exit code 0 when done, 2 when the input was bad."""
+    """Run one command; exit code 0 when done, 2 when the input was bad, 141 when nobody reads on."""
+    try:
+        try:
+            _run(arguments)
+        finally:
+            sys.stdout.flush()
+    except BrokenPipeError:
+        if _is_read(sys.stdout):
+            raise
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # Python flushes once more at its end
+        sys.exit(141)
+
+
+def _run(arguments: Sequence[str] | None) -> None:
     try:
         _check_repeated(sys.argv[1:] if arguments is None else arguments)
         tyro.extras.subcommand_cli_from_dict(
@@ -91,6 +106,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
         hint = "; run the same command again to continue" if goes_on else ""
         Console(stderr=True).print(f"fsid: interrupted{hint}")
         sys.exit(130)
+
+
+def _is_read(stream: TextIO) -> bool:
+    """False for a pipe whose other end is closed, as of `fsid ... | head`."""
+    try:
+        poll = select.poll()
+        poll.register(stream.fileno(), 0)
+    except (OSError, ValueError):
+        return True
+    return not poll.poll(0)
 
 
 def _check_repeated(arguments: Sequence[str]) -> None:
