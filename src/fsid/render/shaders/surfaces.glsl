@@ -1,5 +1,5 @@
 // Table of surfaces (fsid.render.geometry.SURFACE): ten texels a surface, in blocks of SURFACE_ROWS rows. A
-// texture and not a buffer: llvmpipe reads a texel nine times as fast as a buffer element.
+// texel table and not a buffer: llvmpipe reads a texel nine times as fast as a buffer element.
 TEXELS(5, rgba32f, surface_table);
 const int SURFACE_TEXELS = 10;
 const int SURFACE_ROWS = 2048;
