@@ -15,9 +15,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fsid.assets import MATERIAL_VARIANTS, material_families
+from fsid.assets import MATERIAL_VARIANTS, MaterialMaps, material_families
 from fsid.errors import FsidError
-from fsid.render import Frame, GlInfo, Renderer, gpu_device
+from fsid.render import Frame, GlInfo, Renderer, gpu_device, texels
 from fsid.render.context import gl
 from fsid.render.layers import MOST_LAYERS, LayerStore, fitting_size
 from fsid.render.texels import bake_texels, level_ranges
@@ -74,6 +74,28 @@ def test_slots_of_materials_do_not_matter(renderer: Renderer) -> None:
     assert fingerprint(renderer.render(scene(1))) == first
 
 
+def test_images_are_free_while_a_material_is_drawn_and_come_back(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is drawn anew takes as much memory as they do; what comes from the cache does not."""
+    drawn, sizes = texels.draw_material, []
+
+    def draw(family: str, variant: int, size: int) -> MaterialMaps:
+        sizes.append(renderer._targets.size)
+        return drawn(family, variant, size)
+
+    monkeypatch.setattr(texels, "draw_material", draw)
+    renderer.render(scene(2))
+    expected = fingerprint(renderer.render(scene(1)))
+    renderer.render(scene(2))
+    assert renderer._targets.size != (0, 0)
+    monkeypatch.setenv("FSID_CACHE", "off")
+    renderer._layers = LayerStore(renderer._context, 64)
+    sizes.clear()
+    assert fingerprint(renderer.render(scene(1))) == expected
+    assert set(sizes) == {(0, 0)}
+
+
 def test_another_process_renders_the_same(renderer: Renderer) -> None:
     code = (
         "from fsid.render import Renderer; from test_render_determinism import *;"
@@ -107,12 +129,12 @@ def test_layers_leave_in_order_of_last_use(renderer: Renderer) -> None:
 
 def resident(array: TextureArray, level: int, size: int) -> np.ndarray:
     """(layers, size, size, 4) uint8: a mip level of a texture array."""
-    texels = np.empty((array.capacity, size, size, 4), np.uint8)
+    data = np.empty((array.capacity, size, size, 4), np.uint8)
     array.use(0)
     gl("glGetTexImage", c_uint, c_int, c_uint, c_uint, c_void_p)(
-        0x8C1A, level, 0x1908, 0x1401, texels.ctypes.data
+        0x8C1A, level, 0x1908, 0x1401, data.ctypes.data
     )
-    return texels
+    return data
 
 
 def test_a_stored_layer_is_what_was_baked(renderer: Renderer) -> None:
@@ -121,11 +143,11 @@ def test_a_stored_layer_is_what_was_baked(renderer: Renderer) -> None:
     families = [(family, v) for family in material_families()[:6] for v in range(MATERIAL_VARIANTS)]
     for i in range(1, len(families) + 1):
         layers = store.load(families[:i], bake_texels)
-    for level, (size, texels) in enumerate(level_ranges(64)):
+    for level, (size, where) in enumerate(level_ranges(64)):
         for half, array in enumerate(store._arrays):
             found = resident(array, level, size)
             for key, layer in layers.items():
-                expected = bake_texels(*key, 64).data[half, texels].reshape(size, size, 4)
+                expected = bake_texels(*key, 64).data[half, where].reshape(size, size, 4)
                 np.testing.assert_array_equal(found[layer.index], expected)
 
 

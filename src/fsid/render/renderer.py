@@ -51,7 +51,7 @@ from fsid.render.shadow_pass import ShadowPass
 from fsid.render.sharpness import set_sharpness
 from fsid.render.stage import Stage, stage_of
 from fsid.render.targets import Targets
-from fsid.render.texels import Bake, bake_texels
+from fsid.render.texels import Bake, Texels, bake_texels
 from fsid.scene.model import ZERO, Camera, Scene
 
 Mark = Callable[[str], None]
@@ -185,15 +185,15 @@ class Renderer:
         self,
         view: View,
         *,
-        bake: Bake = bake_texels,
+        bake: Bake | None = None,
         shift_px: tuple[float, float] = (0.0, 0.0),
         labels: bool = True,
         mark: Mark = lambda stage: None,
     ) -> Frame:
         """The frame of a view; `render` without the scene.
 
-        bake: where the texels of materials come from. shift_px: moves the image by a part of a pixel (right,
-        down). labels: False may leave albedo, normal and object_id without pixels.
+        bake: where the texels of materials come from; None takes `bake_texels`. shift_px: moves the image by
+        a part of a pixel (right, down). labels: False may leave albedo, normal and object_id without pixels.
         """
         if Renderer._active is not self:
             raise FsidError("this Renderer is closed")
@@ -203,6 +203,7 @@ class Renderer:
         camera, margin = with_margin(asked)
         view = replace(view, camera=camera)
         shot = Shot(lens_of(camera), camera.time_s, shift_px)
+        bake = bake or self._bake
         self._draw(view, shot, bake, mark)
         frame = self._targets.read_frame(labels=labels or is_moving(camera, view.drawables))
         mark("readback")
@@ -269,6 +270,15 @@ class Renderer:
             self._layers.release()
             self._layers = self._new_layers(size)
         return self._layers.load(wanted, bake)
+
+    def _bake(self, family: str, variant: int, size: int) -> Texels:
+        return bake_texels(family, variant, size, self._free_images)
+
+    def _free_images(self) -> None:
+        """Give back those of the frame before while a material is drawn: both would be a worker's peak."""
+        if not self._on_gpu and self._targets.size != (0, 0):
+            self._targets.release()
+            self._drain()
 
     def _new_layers(self, size: int) -> LayerStore:
         if self._on_gpu:

@@ -56,13 +56,19 @@ def level_ranges(size: int) -> list[tuple[int, slice]]:
     return ranges
 
 
-def bake_texels(family: str, variant: int, size: int) -> Texels:
-    """The texels of `bake_material(...)`, from the cache where they are. Raises FsidError."""
+def bake_texels(family: str, variant: int, size: int, make_room: Callable[[], None] = lambda: None) -> Texels:
+    """The texels of `bake_material(...)`, from the cache where they are. make_room: called before they are
+    drawn, which takes up to 170 MiB for 1024 x 1024 of them. Raises FsidError."""
+
+    def drawn() -> Arrays:
+        make_room()
+        return pack(texels_of(rounded(draw_material(family, variant, size))))
+
     name, key = material_key(family, variant, size)
     return stored(
         f"{name}-{size}-texels",
         content_key([key.encode(), code_key((__name__,)).encode()]),
-        lambda: pack(texels_of(rounded(draw_material(family, variant, size)))),
+        drawn,
         lambda arrays: unpack(arrays, size),
         worth=_WORTH,
     )
