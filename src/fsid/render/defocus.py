@@ -11,6 +11,8 @@ disc, a quarter of its diameter. Exact is the mean of many images seen from plac
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from fsid.render.blur import blurred, gaussian_weights
@@ -25,6 +27,7 @@ _COARSE_PX = 1.6
 _COARSE_VARIANCE = 1.0
 """Of halving (1/4) and doubling (3/4) alone, pixels squared."""
 _NONE = 1e-6
+_STRIP = 1 << 15  # values: rows of it stay in the cache with what they are made of
 
 
 def defocus(
@@ -37,26 +40,57 @@ def defocus(
     blur = (1 / depth - np.float32(1 / focus_m)) * np.float32(aperture_m * focal_px / 4)
     place = np.interp(blur**2, _SIGMA_PX**2, np.arange(len(_SIGMA_PX))).astype(np.float32)
     np.copysign(place, blur, out=place)  # above 0 before the sharp plane
+    colours = [np.ascontiguousarray(radiance[..., i]) for i in range(3)]
     seen = np.zeros((4, *depth.shape), np.float32)  # what lies behind the next layer: light * known, known
     for layer in range(int(np.floor(place.min())), int(np.ceil(place.max())) + 1):
         sigma_px = float(_SIGMA_PX[abs(layer)])
         window = _window(np.abs(place - layer) < 1, int(np.ceil(3 * sigma_px)) + 4)
         if window is None:
             continue
-        ahead = place[window] - np.float32(layer)
-        share = np.maximum(1 - np.abs(ahead), 0)
-        own = _blurred(share, sigma_px)
-        cover = _blurred(np.clip(ahead + 1, 0, 1), sigma_px)  # all that is not farther
-        np.minimum(cover, own / _SEEN, out=cover)
+        share, not_farther = _shares(place[window], layer)
+        cover = _blurred(not_farther, sigma_px)
+        lights = [_blurred(colour[window] * share, sigma_px) for colour in colours]
+        lights.append(_blurred(share, sigma_px))
         behind = [plane[window] for plane in seen]
         _continue(behind, sigma_px if layer > 0 and sigma_px > _SHORT_PX else 0.0)
-        front = cover / np.maximum(own, _NONE)
-        for colour, plane in enumerate(behind):
-            plane *= 1 - cover
-            light = own if colour == 3 else _blurred(radiance[window][..., colour] * share, sigma_px)
-            plane += light * front
+        _lay_over(behind, lights, cover)
     seen[:3] /= np.maximum(seen[3], _NONE)
     return np.ascontiguousarray(seen[:3].transpose(1, 2, 0))
+
+
+def _shares(place: np.ndarray, layer: int) -> tuple[np.ndarray, np.ndarray]:
+    """How much of each pixel (H, W) belongs to a layer, and to all that is not farther."""
+    share, not_farther = np.empty(place.shape, np.float32), np.empty(place.shape, np.float32)
+    for rows in _strips(place.shape):
+        ahead = np.subtract(place[rows], np.float32(layer), out=share[rows])
+        np.clip(np.add(ahead, 1, out=not_farther[rows]), 0, 1, out=not_farther[rows])
+        np.maximum(np.subtract(1, np.abs(ahead, out=ahead), out=ahead), 0, out=ahead)
+    return share, not_farther
+
+
+def _lay_over(behind: list[np.ndarray], lights: list[np.ndarray], cover: np.ndarray) -> None:
+    """A blurred layer, three colours and its share of each pixel, over what lies behind it, in place.
+
+    cover: how much of that everything not farther hides. Lights and cover are used up.
+    """
+    for rows in _strips(cover.shape):
+        own, hidden = lights[3][rows], cover[rows]
+        front = np.maximum(own, _NONE)
+        np.minimum(hidden, own / _SEEN, out=hidden)
+        np.divide(hidden, front, out=front)
+        left = np.subtract(1, hidden, out=hidden)
+        for plane, light in zip(behind, lights, strict=True):
+            part = plane[rows]
+            part *= left
+            light[rows] *= front
+            part += light[rows]
+
+
+def _strips(shape: tuple[int, ...]) -> Iterator[slice]:
+    """Rows of pictures (H, W), few enough that several of them stay in the processor's cache."""
+    tall = max(_STRIP // shape[1], 1)
+    for first in range(0, shape[0], tall):
+        yield slice(first, first + tall)
 
 
 def _continue(seen: list[np.ndarray], sigma_px: float) -> None:
@@ -66,9 +100,10 @@ def _continue(seen: list[np.ndarray], sigma_px: float) -> None:
     """
     known = seen[3]
     if sigma_px == 0:
-        scale = np.clip(1 / np.maximum(known, _NONE), 1, 1 / _SEEN)
-        for plane in seen:
-            plane *= scale
+        for rows in _strips(known.shape):
+            scale = np.clip(1 / np.maximum(known[rows], _NONE), 1, 1 / _SEEN)
+            for plane in seen:
+                plane[rows] *= scale
         return
     there = _blurred(known, sigma_px)
     missing = np.minimum(there / _SEEN, 1) - np.minimum(known, 1)
@@ -101,12 +136,29 @@ def _blurred(image: np.ndarray, sigma_px: float) -> np.ndarray:
 
 def _halved(image: np.ndarray) -> np.ndarray:
     height, width = image.shape
-    even = np.pad(image, ((0, height % 2), (0, width % 2)), mode="edge")
-    rows = even[0::2] + even[1::2]
-    return np.asarray((rows[:, 0::2] + rows[:, 1::2]) * np.float32(0.25))
+    if height % 2 or width % 2:
+        image = np.pad(image, ((0, height % 2), (0, width % 2)), mode="edge")
+    rows = image[0::2] + image[1::2]
+    half = rows[:, 0::2] + rows[:, 1::2]
+    half *= np.float32(0.25)
+    return half
 
 
 def _finer(image: np.ndarray, size: tuple[int, int]) -> np.ndarray:
     """Twice as large, linearly interpolated, cut to `size`."""
-    twice = np.repeat(np.repeat(image, 2, 0), 2, 1)
-    return blurred(twice, np.array([0.5, 0.25]))[: size[0], : size[1]]
+    height, width = image.shape
+    tall = np.empty((2 * height, width), np.float32)
+    _between(image, tall[0::2], tall[1::2])
+    wide = np.empty((2 * height, 2 * width), np.float32)
+    for rows in _strips(wide.shape):
+        _between(tall[rows].T, wide[rows, 0::2].T, wide[rows, 1::2].T)
+    return wide[: size[0], : size[1]]
+
+
+def _between(image: np.ndarray, before: np.ndarray, after: np.ndarray) -> None:
+    """Rows a quarter before and after those of `image`, linearly interpolated, its border repeated."""
+    near, far = image * np.float32(0.75), image * np.float32(0.25)
+    np.add(near[1:], far[:-1], out=before[1:])
+    np.add(near[0], far[0], out=before[0])
+    np.add(near[:-1], far[1:], out=after[:-1])
+    np.add(near[-1], far[-1], out=after[-1])
