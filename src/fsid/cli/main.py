@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import select
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import NoReturn, TextIO
 
 import tyro
@@ -52,6 +54,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
 DESCRIPTION = "RAW denoisers trained on nothing but rendered scenes: generate pairs, train, denoise, prove."
 RESUMABLE = {"generate", "train", "experiment", "demo"}
 REPEATABLE = {"--model"}  # of evaluate
+FULL = (errno.ENOSPC, errno.EDQUOT)
 EXTRAS = {
     "torch": "train",
     "accelerate": "train",
@@ -65,17 +68,21 @@ EXTRAS = {
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run one command; exit code 0 when done, 2 when the input was bad, 141 when nobody reads on."""
+    """Run one command; exit code 0 when done, 2 for bad input or a full disk, 141 when nobody reads on."""
     try:
         try:
             _run(arguments)
         finally:
             sys.stdout.flush()
-    except BrokenPipeError:
-        if _is_read(sys.stdout):
+    except OSError as error:
+        is_closed = isinstance(error, BrokenPipeError) and not _is_read(sys.stdout)
+        if not is_closed and error.errno not in FULL:
             raise
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # Python flushes once more at its end
-        sys.exit(141)
+        with suppress(OSError, ValueError):  # Python flushes once more at its end
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        if is_closed:
+            sys.exit(141)
+        _fail(os.strerror(error.errno or 0))
 
 
 def _run(arguments: Sequence[str] | None) -> None:
