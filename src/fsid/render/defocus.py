@@ -40,6 +40,7 @@ def defocus(
     blur = (1 / depth - np.float32(1 / focus_m)) * np.float32(aperture_m * focal_px / 4)
     place = np.interp(blur**2, _SIGMA_PX**2, np.arange(len(_SIGMA_PX))).astype(np.float32)
     np.copysign(place, blur, out=place)  # above 0 before the sharp plane
+    del blur
     colours = [np.ascontiguousarray(radiance[..., i]) for i in range(3)]
     seen = np.zeros((4, *depth.shape), np.float32)  # what lies behind the next layer: light * known, known
     for layer in range(int(np.floor(place.min())), int(np.ceil(place.max())) + 1):
@@ -49,11 +50,14 @@ def defocus(
             continue
         share, not_farther = _shares(place[window], layer)
         cover = _blurred(not_farther, sigma_px)
-        lights = [_blurred(colour[window] * share, sigma_px) for colour in colours]
-        lights.append(_blurred(share, sigma_px))
+        del not_farther
         behind = [plane[window] for plane in seen]
         _continue(behind, sigma_px if layer > 0 and sigma_px > _SHORT_PX else 0.0)
-        _lay_over(behind, lights, cover)
+        own = _blurred(share, sigma_px)
+        left, front = _weights(own, cover)
+        _lay_over(behind[3], own, left, front)
+        for plane, colour in zip(behind, colours, strict=False):
+            _lay_over(plane, _blurred(colour[window] * share, sigma_px), left, front)
     seen[:3] /= np.maximum(seen[3], _NONE)
     return np.ascontiguousarray(seen[:3].transpose(1, 2, 0))
 
@@ -68,22 +72,25 @@ def _shares(place: np.ndarray, layer: int) -> tuple[np.ndarray, np.ndarray]:
     return share, not_farther
 
 
-def _lay_over(behind: list[np.ndarray], lights: list[np.ndarray], cover: np.ndarray) -> None:
-    """A blurred layer, three colours and its share of each pixel, over what lies behind it, in place.
+def _weights(own: np.ndarray, cover: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """How much of what lies behind a blurred layer is left, and by how much its light goes over that.
 
-    cover: how much of that everything not farther hides. Lights and cover are used up.
+    own: its share of each pixel (H, W). cover: how much everything not farther hides; it is used up.
     """
-    for rows in _strips(cover.shape):
-        own, hidden = lights[3][rows], cover[rows]
-        front = np.maximum(own, _NONE)
-        np.minimum(hidden, own / _SEEN, out=hidden)
-        np.divide(hidden, front, out=front)
-        left = np.subtract(1, hidden, out=hidden)
-        for plane, light in zip(behind, lights, strict=True):
-            part = plane[rows]
-            part *= left
-            light[rows] *= front
-            part += light[rows]
+    front = np.empty(own.shape, np.float32)
+    for rows in _strips(own.shape):
+        hidden = np.minimum(cover[rows], own[rows] / _SEEN, out=cover[rows])
+        np.divide(hidden, np.maximum(own[rows], _NONE), out=front[rows])
+        np.subtract(1, hidden, out=hidden)
+    return cover, front
+
+
+def _lay_over(behind: np.ndarray, light: np.ndarray, left: np.ndarray, front: np.ndarray) -> None:
+    """behind * left + light * front, in place."""
+    for rows in _strips(behind.shape):
+        part = behind[rows]
+        part *= left[rows]
+        part += light[rows] * front[rows]
 
 
 def _strips(shape: tuple[int, ...]) -> Iterator[slice]:
