@@ -72,8 +72,8 @@ def generate(
         quality: Of the rasteriser: high (default) or fast.
         images: Folder of photographs, or of linear .exr renders of any engine, to take instead
             of scenes; frames are random windows of at most WIDTH x HEIGHT pixels.
-        workers: Number of processes (of the whole cluster with --ray), each takes up to 1.2 GB of memory at
-            1920x1080. The result does not depend on it.
+        workers: Number of processes (of the whole cluster with --ray), on a CPU of up to 1.2 GB of memory
+            each at 1920x1080; the result does not depend on it.
         ray: Address of a Ray cluster to work on: auto, ray://HOST:10001, or local to start one here.
         workers_per_gpu: How many workers share a GPU: worker w renders on GPU w // N, on a cluster on the one
             that Ray assigns. 0: every worker takes the first there is.

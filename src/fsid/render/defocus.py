@@ -54,7 +54,7 @@ def defocus(
         behind = [plane[window] for plane in seen]
         _continue(behind, sigma_px if layer > 0 and sigma_px > _SHORT_PX else 0.0)
         own = _blurred(share, sigma_px)
-        left, front = _weights(own, cover)
+        left, front = _blend_weights(own, cover)
         _lay_over(behind[3], own, left, front)
         for plane, colour in zip(behind, colours, strict=False):
             _lay_over(plane, _blurred(colour[window] * share, sigma_px), left, front)
@@ -63,7 +63,7 @@ def defocus(
 
 
 def _shares(place: np.ndarray, layer: int) -> tuple[np.ndarray, np.ndarray]:
-    """How much of each pixel (H, W) belongs to a layer, and to all that is not farther."""
+    """How much of each pixel is of a layer, and of all that is not farther, (H, W), 0..1; place: (H, W)."""
     share, not_farther = np.empty(place.shape, np.float32), np.empty(place.shape, np.float32)
     for rows in _strips(place.shape):
         ahead = np.subtract(place[rows], np.float32(layer), out=share[rows])
@@ -72,7 +72,7 @@ def _shares(place: np.ndarray, layer: int) -> tuple[np.ndarray, np.ndarray]:
     return share, not_farther
 
 
-def _weights(own: np.ndarray, cover: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _blend_weights(own: np.ndarray, cover: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """How much of what lies behind a blurred layer is left, and by how much its light goes over that.
 
     own: its share of each pixel (H, W). cover: how much everything not farther hides; it is used up.
@@ -86,7 +86,7 @@ def _weights(own: np.ndarray, cover: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def _lay_over(behind: np.ndarray, light: np.ndarray, left: np.ndarray, front: np.ndarray) -> None:
-    """behind * left + light * front, in place."""
+    """behind * left + light * front, all (H, W), in place."""
     for rows in _strips(behind.shape):
         part = behind[rows]
         part *= left[rows]
@@ -163,7 +163,8 @@ def _finer(image: np.ndarray, size: tuple[int, int]) -> np.ndarray:
 
 
 def _between(image: np.ndarray, before: np.ndarray, after: np.ndarray) -> None:
-    """Rows a quarter before and after those of `image`, linearly interpolated, its border repeated."""
+    """Rows a quarter before and after those of `image`, all (h, w), linearly interpolated; its border is
+    repeated."""
     near, far = image * np.float32(0.75), image * np.float32(0.25)
     np.add(near[1:], far[:-1], out=before[1:])
     np.add(near[0], far[0], out=before[0])
