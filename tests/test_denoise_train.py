@@ -195,6 +195,7 @@ def test_the_best_network_on_held_out_scenes_is_kept(tmp_path: Path, monkeypatch
     card = json.loads(model.with_suffix(".json").read_text())
     assert card["details"]["validation"] == [rows[int(np.argmax(scores))]]
     assert card["details"]["config"]["seed"] == 0
+    assert card["details"]["shrink"] == [1]
     assert card["sessions"][-1]["first_step"] == 0
     assert card["training"].startswith("8 images")
     last = load_denoiser(tmp_path / "run" / "last.safetensors").net.state_dict()

@@ -20,7 +20,7 @@ from fsid.evaluate.compare import ImageRow
 from fsid.evaluate.dead_leaves import RADIUS_PX, dead_leaves_rand
 from fsid.evaluate.demo import DemoConfig
 from fsid.evaluate.experiment_report import gaps
-from fsid.evaluate.experiments import PHOTOGRAPHS, TEST_ISOS, _data, scale_config
+from fsid.evaluate.experiments import PHOTOGRAPHS, TEST_ISOS, _data, _training, scale_config
 from fsid.sensor import load_profile, save_profile
 
 SMOKE = ("--scale", "smoke", "--count", "2", "--steps", "3", "--quiet")
@@ -96,6 +96,14 @@ def test_folders_and_cameras_are_taken_as_named(photos: Path, tmp_path: Path):
     generated = read_yaml(data / "config.yaml")["generate"]
     assert (generated["images"], generated["cameras"]) == (str(folder), [str(camera)])
     assert min(generated["width"], generated["height"]) > max(config.width, config.height)  # never cut small
+
+
+def test_sources_of_all_sizes_are_trained_on_alike(tmp_path: Path):
+    config = scale_config("ablation", "paper")
+    assert _training(config, 3).shrink == (1,)
+    network = tmp_path / "network.yaml"
+    network.write_text("shrink: [1, 2]")
+    assert _training(replace(config, network=str(network)), 3).shrink == (1, 2)
 
 
 @pytest.mark.parametrize(

@@ -164,15 +164,44 @@ def test_sizes_take_turns_and_each_has_its_epochs(tmp_path: Path) -> None:
         assert abs(columns[one] - columns[other]) == pytest.approx(28, abs=3)
 
 
-@pytest.mark.parametrize("shrink", [(), (3,), (0,), (2, 2), (-2,)])
+@pytest.mark.parametrize("shrink", [(3,), (0,), (2, 2), (-2,)])
 def test_sizes_are_different_powers_of_two(shrink: tuple[int, ...]) -> None:
     with pytest.raises(FsidError, match="powers of 2"):
         replace(CONFIG, shrink=shrink)
 
 
-def test_stored_noise_is_of_the_size_it_was_made_for() -> None:
+@pytest.mark.parametrize(
+    ("width", "height", "size_px", "sizes"),
+    [
+        (1920, 1080, 64, (1, 2, 4)),
+        (1080, 1920, 64, (1, 2, 4)),
+        (4000, 3000, 64, (1, 2, 4, 8)),
+        (958, 540, 64, (1,)),
+        (1920, 500, 64, (1, 2)),
+        (1920, 1080, 200, (1, 2)),
+    ],
+)
+def test_large_images_are_drawn_at_several_sizes(
+    width: int, height: int, size_px: int, sizes: tuple[int, ...], tmp_path: Path
+) -> None:
+    data = write_dataset(tmp_path, [raw(np.zeros((height, width)))])
+    config = replace(CONFIG, size_px=size_px, shrink=())
+    assert PatchDataset(data, config, seed=0).shrink == sizes
+
+
+def test_most_images_say_how_large_they_all_are(tmp_path: Path) -> None:
+    images = [raw(np.zeros(shape)) for shape in ((40, 60), (600, 1000), (600, 1000))]
+    patches = PatchDataset(write_dataset(tmp_path, images), replace(CONFIG, shrink=()), seed=0)
+    assert patches.shrink == (1, 2)
+
+
+def test_stored_noise_is_of_the_size_it_was_made_for(tmp_path: Path) -> None:
     with pytest.raises(FsidError, match="stored noise"):
         replace(CONFIG, shrink=(2,), noise="stored")
+    image = Raw(np.full((600, 1000), 0.3, np.float32), "RGGB", 64, 1023, (1.0, 1.0, 1.0), np.eye(3))
+    noisy = replace(image, noise=NoiseLevel(k=(1e-3,) * 4, sigma2=(1e-5,) * 4))
+    pairs = write_pairs(tmp_path, [image], [noisy])
+    assert PatchDataset(pairs, replace(CONFIG, shrink=(), noise="stored"), seed=0).shrink == (1,)
 
 
 def test_a_size_that_no_image_is_large_enough_for_is_refused(dataset: Path) -> None:

@@ -8,14 +8,20 @@ more than a patch lies in a cell, for the shift of a mirrored window.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from statistics import median
 
 import numpy as np
 
 from fsid.dataset.index import StoredMosaic
 from fsid.dataset.order import mixed, shuffled
 from fsid.errors import FsidError
+
+
+_LEAST_PX = 480
+"""Longer side of images made smaller: frames of this size train best (docs/rounds/size-of-frames.md)."""
 
 
 @dataclass(frozen=True)
@@ -107,5 +113,16 @@ class Grid:
 def check_shrink(shrink: tuple[int, ...]) -> None:
     """FsidError unless these are different powers of 2."""
     powers = [factor for factor in shrink if factor > 0 and factor & (factor - 1) == 0]
-    if not shrink or len(set(powers)) < len(shrink):
+    if len(set(powers)) < len(shrink):
         raise FsidError(f"shrink {list(shrink)}: give different powers of 2, such as [1,2,4]")
+
+
+def shrink_for(mosaics: Sequence[StoredMosaic], size_px: int) -> tuple[int, ...]:
+    """The sizes to draw images at where none are named: 1, 2, 4 ... times smaller, while the longer side of
+    most keeps 480 pixels, and all of it as long as patches of `size_px` packed pixels fit."""
+    longer = median(max(mosaic.height, mosaic.width) for mosaic in mosaics)
+    shorter = median(min(mosaic.height, mosaic.width) for mosaic in mosaics)
+    factors = [1]
+    while longer >= 2 * factors[-1] * _LEAST_PX and shorter >= 2 * factors[-1] * (2 * size_px + 2):
+        factors.append(2 * factors[-1])
+    return tuple(factors)

@@ -40,7 +40,7 @@ import torch
 from torch import Tensor
 from torch.utils.data import Dataset
 
-from fsid.dataset.cells import Cell, Grid, check_shrink
+from fsid.dataset.cells import Cell, Grid, check_shrink, shrink_for
 from fsid.dataset.index import StoredMosaic, index_mosaics
 from fsid.dataset.levels import LevelTable
 from fsid.errors import FsidError
@@ -76,7 +76,8 @@ class PatchConfig:
     noise is drawn, by name or file. iso_min, iso_max: log-uniform range. held_out: so many images at the end
     of the dataset are not drawn, nor others of their scenes; they are for validation. noise: "fresh" draws it
     anew every time; "stored" takes the noisy images of the dataset, and profiles and ISO play no part.
-    shrink: how many times smaller images are made, powers of 2; as many patches of each.
+    shrink: how many times smaller images are made, powers of 2; as many patches of each. Empty: 1, 2, 4 ...
+    while the longer side of most images keeps 480 pixels (stored noise: as they are).
     """
 
     size_px: int
@@ -94,7 +95,7 @@ class PatchConfig:
         if self.noise not in get_args(Noise):
             raise FsidError(f"noise: {self.noise!r} is not one of {', '.join(get_args(Noise))}")
         check_shrink(self.shrink)
-        if self.noise == "stored" and self.shrink != (1,):
+        if self.noise == "stored" and self.shrink not in ((), (1,)):
             raise FsidError(f"shrink {list(self.shrink)}: stored noise is of the images as they are")
 
 
@@ -132,7 +133,7 @@ class PatchDataset(Dataset[Batch]):
         self._levels = LevelTable(self._profiles, (config.iso_min, config.iso_max))
         self._config, self._seed = config, seed
         self._maps: OrderedDict[Path, np.ndarray] = OrderedDict()
-        self._grids = [Grid(self._mosaics, config.size_px, shrink) for shrink in config.shrink]
+        self._grids = [Grid(self._mosaics, config.size_px, shrink) for shrink in self._sizes()]
 
     @property
     def mosaics(self) -> int:
@@ -140,9 +141,19 @@ class PatchDataset(Dataset[Batch]):
         return len(self._mosaics)
 
     @property
+    def shrink(self) -> tuple[int, ...]:
+        """How many times smaller the images are made, as chosen where the configuration leaves it open."""
+        return tuple(grid.shrink for grid in self._grids)
+
+    @property
     def patches(self) -> int:
         """How many patches an epoch has, of images of all sizes and all ranks together."""
         return sum(grid.patches for grid in self._grids)
+
+    def _sizes(self) -> tuple[int, ...]:
+        if self._config.noise == "stored":
+            return (1,)
+        return self._config.shrink or shrink_for(self._mosaics, self._config.size_px)
 
     def empty_batch(self) -> Batch:
         """Memory for a batch, not filled yet."""

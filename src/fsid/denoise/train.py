@@ -105,7 +105,7 @@ def train(
         forward = torch.compile(net) if _compiles(config) else net
         feed = batches(patches, range(state.step, config.steps), config.loader_processes, pin=gpu)
         with LiveLine(config, state.step, accelerator.num_processes, quiet=not shown) as live:
-            card = _card(data_dir, config, patches.mosaics, initial)
+            card = _card(data_dir, config, patches, initial)
             keeper = _Keeper(data_dir, run_dir, config, accelerator, card, command, state, live)
             for batch in feed:
                 rate = learning_rate(config, state.step)
@@ -196,11 +196,14 @@ class _Keeper:
         save_model(self._run_dir / name, state.average, card, sessions)
 
 
-def _card(data_dir: Path, config: TrainConfig, images: int, initial: Denoiser | None) -> ModelCard:
+def _card(
+    data_dir: Path, config: TrainConfig, patches: PatchDataset, initial: Denoiser | None
+) -> ModelCard:
     """The card of the network to come, without results."""
     file = data_dir / CONFIG_FILE
-    training = f"{images} images of {data_dir.resolve().name}"
-    details = {"config": to_plain(config), "data": read_yaml(file) if file.is_file() else {}}
+    training = f"{patches.mosaics} images of {data_dir.resolve().name}"
+    data = read_yaml(file) if file.is_file() else {}
+    details = {"config": to_plain(config), "shrink": list(patches.shrink), "data": data}
     if initial is not None:
         training += f" after {initial.card.training}"
         details["initial"] = to_plain(initial.card)

@@ -26,8 +26,8 @@ class TrainConfig:
     file or the name of a shipped one; "" starts from random weights. steps: of the optimizer. batch: patches
     per step and process. patch_px: side of a patch in packed pixels (the mosaic patch has twice that).
     shrink: how many times smaller images are made before patches are cut, powers of 2, with as many patches
-    of each ([1, 2, 4] for large images, of which a patch shows little). learning_rate: peak; final_rate: end
-    of the cosine as a share of it. warmup_steps: linear rise. betas, weight_decay: of AdamW. clip_norm:
+    of each; empty: 1, 2, 4 ... while the longer side of most images keeps 480 pixels, since a patch shows
+    little of a large image. learning_rate: peak; final_rate: end of the cosine as a share of it. warmup_steps: linear rise. betas, weight_decay: of AdamW. clip_norm:
     largest gradient norm. ema_decay: of the moving average of the weights, which is the model that is kept.
     profiles: cameras whose noise is drawn, by name or file. iso_min, iso_max: log-uniform range. held_out:
     images at the end of the dataset that are for validation, at most a fifth of it. validate_every: steps.
@@ -42,7 +42,7 @@ class TrainConfig:
     steps: int = 200_000
     batch: int = 16
     patch_px: int = 64
-    shrink: tuple[int, ...] = (1,)
+    shrink: tuple[int, ...] = ()
     learning_rate: float = 1e-3
     final_rate: float = 0.001
     warmup_steps: int = 1000

@@ -133,7 +133,8 @@ def _chain_sections(out: Path, ours: Method) -> list[Section]:
 
 
 def _training(config: DemoConfig) -> TrainConfig:
-    return train_config("nafnet-tiny", [f"steps={config.steps}"] if config.steps else [])
+    steps = [f"steps={config.steps}"] if config.steps else []
+    return train_config("nafnet-tiny", ["shrink=[1]", *steps])
 
 
 def _copy_photographs(folder: Path, count: int) -> Path:

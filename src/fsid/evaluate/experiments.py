@@ -14,7 +14,7 @@ import csv
 import os
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Literal
 
@@ -171,7 +171,9 @@ def _check(out: Path, config: ExperimentConfig, bar: ProgressBar, workers: int) 
 
 def _training(config: ExperimentConfig, seed: int) -> TrainConfig:
     steps = [f"steps={config.steps}"] if config.steps else []
-    return train_config(config.network, [f"seed={seed}", *config.train_settings, *steps])
+    training = train_config(config.network, [f"seed={seed}", *config.train_settings, *steps])
+    # scenes and photographs differ in size, and their trainings must not
+    return training if training.shrink else replace(training, shrink=(1,))
 
 
 def _count(config: ExperimentConfig, source: str) -> int:
