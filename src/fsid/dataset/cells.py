@@ -19,7 +19,6 @@ from fsid.dataset.index import StoredMosaic
 from fsid.dataset.order import mixed, shuffled
 from fsid.errors import FsidError
 
-
 _LEAST_PX = 480
 """Longer side of images made smaller: frames of this size train best (docs/rounds/size-of-frames.md)."""
 

@@ -196,9 +196,7 @@ class _Keeper:
         save_model(self._run_dir / name, state.average, card, sessions)
 
 
-def _card(
-    data_dir: Path, config: TrainConfig, patches: PatchDataset, initial: Denoiser | None
-) -> ModelCard:
+def _card(data_dir: Path, config: TrainConfig, patches: PatchDataset, initial: Denoiser | None) -> ModelCard:
     """The card of the network to come, without results."""
     file = data_dir / CONFIG_FILE
     training = f"{patches.mosaics} images of {data_dir.resolve().name}"

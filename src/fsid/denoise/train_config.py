@@ -27,14 +27,15 @@ class TrainConfig:
     per step and process. patch_px: side of a patch in packed pixels (the mosaic patch has twice that).
     shrink: how many times smaller images are made before patches are cut, powers of 2, with as many patches
     of each; empty: 1, 2, 4 ... while the longer side of most images keeps 480 pixels, since a patch shows
-    little of a large image. learning_rate: peak; final_rate: end of the cosine as a share of it. warmup_steps: linear rise. betas, weight_decay: of AdamW. clip_norm:
-    largest gradient norm. ema_decay: of the moving average of the weights, which is the model that is kept.
-    profiles: cameras whose noise is drawn, by name or file. iso_min, iso_max: log-uniform range. held_out:
-    images at the end of the dataset that are for validation, at most a fifth of it. validate_every: steps.
-    validation_photos: a folder of photographs to validate on as well ("" for none). seed: of weights, patches
-    and noise. log_every, checkpoint_every: steps. tensorboard: write its logs, where it is installed.
-    compile: the network with torch.compile; auto does on a GPU. threads: of PyTorch on a CPU, 0 leaves its
-    own choice. loader_processes: extra processes that prepare batches (0: none, right on a CPU).
+    little of a large image. learning_rate: peak; final_rate: end of the cosine as a share of it.
+    warmup_steps: linear rise. betas, weight_decay: of AdamW. clip_norm: largest gradient norm. ema_decay: of
+    the moving average of the weights, which is the model that is kept. profiles: cameras whose noise is
+    drawn, by name or file. iso_min, iso_max: log-uniform range. held_out: images at the end of the dataset
+    that are for validation, at most a fifth of it. validate_every: steps. validation_photos: a folder of
+    photographs to validate on as well ("" for none). seed: of weights, patches and noise. log_every,
+    checkpoint_every: steps. tensorboard: write its logs, where it is installed. compile: the network with
+    torch.compile; auto does on a GPU. threads: of PyTorch on a CPU, 0 leaves its own choice.
+    loader_processes: extra processes that prepare batches (0: none, right on a CPU).
     """
 
     network: NetworkConfig = field(default_factory=NetworkConfig)
