@@ -176,6 +176,41 @@ def test_a_refused_output_leaves_nothing(dng_bursts, tmp_path, capsys):
         assert list(folder.iterdir()) == []
 
 
+def test_no_frame_is_written_over(tmp_path, rng, capsys):
+    """A shell puts the first frame after an -o that was left without a name."""
+    frames = tmp_path / "frames"
+    files = write_burst(frames, rng, scene(0.5), 1600, 3)
+    (frames / "fit.png").write_bytes(b"a picture")
+    link = tmp_path / "p.yaml"
+    link.symlink_to(files[0])
+    before = {file: file.read_bytes() for file in frames.iterdir()}
+    plot, profile = frames / "fit.png", tmp_path / "q.yaml"
+    for named, arguments in (
+        (files[0], ["-o", files[0]]),
+        (link, ["-o", link]),
+        (plot, ["-o", profile, "--plot", plot]),
+    ):
+        with pytest.raises(SystemExit) as caught:
+            main(["calibrate", str(frames), *map(str, arguments)])
+        assert caught.value.code == 2
+        assert capsys.readouterr().err.startswith(f"fsid: {named}: ")
+    assert {file: file.read_bytes() for file in frames.iterdir()} == before
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["frames", "p.yaml"]
+
+
+def test_the_name_of_a_camera_is_printed_as_it_is(tmp_path, rng, capsys):
+    write_burst(tmp_path / "frames", rng, scene(0.5), 1600, 3)
+    name, source = "mine [b] [/home/me]", "bench [red], [/lab/2]"
+    profile = str(tmp_path / "p.yaml")
+    main(["calibrate", str(tmp_path / "frames"), "-o", profile, "--camera", name])
+    assert name in capsys.readouterr().out
+    save_profile(profile, replace(load_profile(profile), source=source))
+    main(["profiles", profile])
+    out = capsys.readouterr().out
+    assert name in out
+    assert source in out
+
+
 def test_read_noise_that_reaches_zero_is_said_and_still_found(tmp_path, rng):
     paths = {
         kind: write_burst(tmp_path / kind, rng, scene(light), 12800, 10)

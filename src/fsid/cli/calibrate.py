@@ -62,12 +62,11 @@ def calibrate(
     from fsid.files import write_together
     from fsid.sensor import Layout
     from fsid.sensor import calibrate as calibrate_frames
-    from fsid.sensor.fit_plot import calibration_picture, check_output, check_picture
+    from fsid.sensor.fit_plot import calibration_picture, check_profile
+    from fsid.sensor.frames import frame_files
     from fsid.sensor.profiles import profile_file
 
-    check_output(output)
-    if plot is not None:
-        check_picture(plot, output)
+    check_profile(output, [*frame_files(frames), *frame_files(dark)], plot)
     layout = Layout(iso, cfa, black_level, white_level, width, height)
     with progress_bar("reading", "frames", quiet=quiet) as progress:
         found = calibrate_frames(
@@ -89,7 +88,8 @@ def calibrate(
 
 def _table(found: Calibration) -> Table:
     """The lines that were fitted, a row per ISO and CFA site."""
-    table = Table("ISO", "site", "black (DN)", "k (DN)", "±", "sigma2 (DN²)", "±", title=found.profile.camera)
+    title = Text(found.profile.camera)
+    table = Table("ISO", "site", "black (DN)", "k (DN)", "±", "sigma2 (DN²)", "±", title=title)
     for level, fit in zip(found.profile.iso, found.fits, strict=True):
         for site, label in enumerate(("R", "Gr", "Gb", "B") if len(fit.k_dn) == 4 else ("mono",)):
             values = (fit.k_dn, fit.k_dn_error, fit.sigma2_dn, fit.sigma2_dn_error)

@@ -103,7 +103,8 @@ def denoise(
         )
     if not quiet:
         k, sigma2 = (sum(values) / 4 for values in (noise.level.k, noise.level.sigma2))
-        console.print(f"noise: {noise.source}, k = {k:.3g}, sigma2 = {sigma2:.3g}", soft_wrap=True)
+        line = f"noise: {noise.source}, k = {k:.3g}, sigma2 = {sigma2:.3g}"
+        console.print(Text(line), soft_wrap=True)
 
 
 def _note_left_out(folder: Path, output: Path, *, bare: bool) -> None:

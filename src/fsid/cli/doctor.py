@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 
 def doctor() -> None:
@@ -13,6 +14,6 @@ def doctor() -> None:
     table = Table(show_header=False, box=None)
     try:
         for name, finding in examine():
-            table.add_row(f"[bold]{name}[/bold]", finding)
+            table.add_row(Text(name, style="bold"), Text(finding))
     finally:
         Console().print(table)

@@ -38,4 +38,5 @@ def export(
             f"{done.file}: {done.precision}, {done.file.stat().st_size / 1e6:.2f} MB{agreement}; "
             f"{done.psnr:.2f} dB on photographs, of which the precision costs {done.loss_db:.3f} dB",
             soft_wrap=True,
+            markup=False,
         )

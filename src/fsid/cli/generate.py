@@ -122,7 +122,7 @@ def generate(
         if not is_begun(out, dataset):
             _check_sources(settings, count, workforce, quiet=quiet)
         made = _make(out, settings, count, seed, workforce, quiet=quiet)
-        console.print(f"{out}: {count} pairs, {made} of them new")
+        console.print(f"{out}: {count} pairs, {made} of them new", soft_wrap=True, markup=False)
 
 
 def _check_sources(settings: GenerateConfig, count: int, workforce: Workforce, *, quiet: bool) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from rich.console import Console
 from rich.table import Column, Table
+from rich.text import Text
 from tyro.conf import Positional
 
 from fsid.errors import FsidError
@@ -32,13 +33,14 @@ def profiles(name: Positional[str | None] = None, *, plot: Path | None = None) -
         for known in profile_names():
             profile = load_profile(known)
             levels = (profile.cfa, str(profile.black_level), str(profile.white_level))
-            table.add_row(known, profile.camera, *levels, f"{min(profile.iso):g} .. {max(profile.iso):g}")
+            table.add_row(
+                known, Text(profile.camera), *levels, f"{min(profile.iso):g} .. {max(profile.iso):g}"
+            )
         console.print(table)
         return
     profile = load_profile(name)
-    console.print(
-        f"[bold]{profile.camera}[/bold]  CFA {profile.cfa}, DN {profile.black_level}..{profile.white_level}"
-    )
+    integers = f"  CFA {profile.cfa}, DN {profile.black_level}..{profile.white_level}"
+    console.print(Text(profile.camera, style="bold"), integers, sep="")
     console.print(
         "Var(x) = k x + sigma2, x = (DN - black) / (white - black), as used (mean of the four CFA sites)"
     )
@@ -49,6 +51,6 @@ def profiles(name: Positional[str | None] = None, *, plot: Path | None = None) -
         k, sigma2 = sum(level.k) / 4, sum(level.sigma2) / 4
         table.add_row(f"{iso:g}", f"{k:.3e}", f"{sigma2:.3e}", f"{sigma2**0.5 * span:.2f}")
     console.print(table)
-    console.print(profile.source)
+    console.print(Text(profile.source))
     if plot is not None:
         write_atomically(plot, profile_picture(profile, plot.suffix))

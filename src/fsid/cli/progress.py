@@ -42,7 +42,7 @@ class Bar:
     def failed(self, line: str) -> None:
         """Something failed that will be tried again."""
         self._failures += 1
-        self._bar.console.print(line, style="yellow", soft_wrap=True)
+        self._bar.console.print(line, style="yellow", soft_wrap=True, markup=False)
         self._bar.update(self._task, failures=f"{self._failures} failures")
 
 

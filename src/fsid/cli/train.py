@@ -59,4 +59,4 @@ def train(
     command = shlex.join(["fsid", *sys.argv[1:]])
     model = train_network(data, output, settings, resume=resume, quiet=quiet, command=command)
     if not quiet and is_main:
-        Console(stderr=True).print(f"model: {model}", soft_wrap=True)
+        Console(stderr=True).print(f"model: {model}", soft_wrap=True, markup=False)

@@ -7,6 +7,7 @@ last column shows k and sigma2 over ISO with the profile's law, where there are 
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from io import BytesIO
 from pathlib import Path
 
@@ -23,6 +24,7 @@ from fsid.sensor.mosaic import SITES
 
 COLOURS = ("tab:red", "tab:green", "tab:olive", "tab:blue")
 PICTURES = (".png", ".pdf", ".svg")
+PROFILES = (".yaml", ".yml")
 _MAX_COLUMNS = 4  # ISOs in one picture; of more, evenly chosen ones
 
 
@@ -36,6 +38,22 @@ def check_picture(path: Path, beside: Path | None = None) -> None:
     if path.suffix.lower() not in PICTURES:
         raise FsidError(f"{path}: a plot is written as {', '.join(PICTURES)}")
     check_output(path)
+
+
+def check_profile(path: Path, frames: Collection[Path] = (), plot: Path | None = None) -> None:
+    """FsidError unless a profile can be written to `path`, a picture to `plot`, and neither is of `frames`.
+
+    Profiles are .yaml: a shell puts the first frame after an -o that was left without a name.
+    """
+    if path.suffix.lower() not in PROFILES:
+        raise FsidError(f"{path}: a profile is written as {' or '.join(PROFILES)}")
+    check_output(path)
+    if plot is not None:
+        check_picture(plot, path)
+    taken = {frame.resolve() for frame in frames}
+    for written in (path, plot):
+        if written is not None and written.resolve() in taken:
+            raise FsidError(f"{written}: is one of the frames; write to another file")
 
 
 def check_output(path: Path) -> None:

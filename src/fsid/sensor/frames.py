@@ -80,7 +80,7 @@ def find_frames(
     progress: Callable[[int, int], None] | None = None,
 ) -> FrameSet:
     """Look at every file once: RAW headers, and the level and maximum of bare mosaics."""
-    paths, dark = _files(paths), _files(dark)
+    paths, dark = frame_files(paths), frame_files(dark)
     if not paths:
         raise FsidError("calibration needs the frames of at least one burst")
     if both := {path.resolve() for path in paths} & {path.resolve() for path in dark}:
@@ -112,7 +112,7 @@ def _same_light(one: Frame, other: Frame) -> bool:
     return abs(one.level - other.level) <= max(SAME_LIGHT * other.level, SAME_DN)
 
 
-def _files(paths: Sequence[Path]) -> list[Path]:
+def frame_files(paths: Sequence[Path]) -> list[Path]:
     """`paths` with folders replaced by the files in them and in their folders, each file once."""
     files: dict[Path, Path] = {}
     for path in paths:
