@@ -37,7 +37,7 @@ from fsid.denoise.checkpoint import load_checkpoint  # noqa: E402
 from fsid.denoise.raw_denoiser import RawDenoiser  # noqa: E402
 from fsid.denoise.stabilise import stabilise, unstabilise  # noqa: E402
 from fsid.denoise.train import learning_rate, noise_left  # noqa: E402
-from fsid.denoise.validate import held_out, validation  # noqa: E402
+from fsid.denoise.validate import Validation, held_out, validation  # noqa: E402
 from fsid.errors import FsidError  # noqa: E402
 from fsid.files import held  # noqa: E402
 from fsid.sensor import Raw, add_noise, clean_levels, load_profile, write_dng  # noqa: E402
@@ -203,6 +203,37 @@ def test_the_best_network_on_held_out_scenes_is_kept(tmp_path: Path, monkeypatch
     assert watch.measure(last)["psnr_scenes"] == pytest.approx(scores[-1], abs=1e-9)
     best = load_denoiser(model).net.state_dict()
     assert watch.measure(best)["psnr_scenes"] == pytest.approx(max(scores), abs=1e-9)
+
+
+def test_a_dataset_that_grew_is_judged_by_what_it_holds_out_now(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The network before was measured on other images, and easier ones here."""
+    scores = iter([50.0, 40.0])
+    monkeypatch.setattr(Validation, "measure", lambda self, weights: {"psnr_scenes": next(scores)})
+    folder, run, rng = tmp_path / "data", tmp_path / "run", np.random.default_rng(3)
+    folder.mkdir()
+    samples = [stored(rng, number) for number in range(10)]
+    write_shard(shard_path(folder, 0), samples[:5])
+    config = replace(CONFIG, held_out=1, validate_every=4)
+
+    def stop(done: int, steps: int) -> None:
+        if done == 5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        train(folder, run, config, progress=stop)
+    write_shard(shard_path(folder, 1), samples[5:])
+    card = load_denoiser(train(folder, run, config, quiet=True)).card
+    assert card.details["validation"] == [{"step": 8, "images": 9, "psnr_scenes": 40.0}]
+
+
+def test_a_run_keeps_the_sizes_that_it_was_begun_with(data: Path, tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    train(data, run, replace(CONFIG, shrink=(2,), steps=2), quiet=True)
+    assert load_denoiser(train(data, run, replace(CONFIG, steps=2), quiet=True)).card.details["shrink"] == [2]
+    with pytest.raises(FsidError, match="another shrink"):
+        train(data, run, replace(CONFIG, shrink=(1,), steps=2), quiet=True)
 
 
 def test_photographs_are_watched_and_do_not_choose(data: Path, photos: Path, tmp_path: Path) -> None:

@@ -81,7 +81,8 @@ def train(
     unusable data or settings, another run in `run_dir`, another process at work there, or a training that
     diverges. PyTorch's number of threads and its random numbers on the CPU are afterwards what they were.
     """
-    data_dir, run_dir, config = Path(data_dir), Path(run_dir), as_read(config, source="config")
+    data_dir, run_dir = Path(data_dir), Path(run_dir)
+    config = _sizes_as_begun(run_dir, as_read(config, source="config"))
     if config.threads:
         torch.set_num_threads(config.threads)
     gpu = torch.cuda.is_available()
@@ -106,7 +107,8 @@ def train(
         feed = batches(patches, range(state.step, config.steps), config.loader_processes, pin=gpu)
         with LiveLine(config, state.step, accelerator.num_processes, quiet=not shown) as live:
             card = _card(data_dir, config, patches, initial)
-            keeper = _Keeper(data_dir, run_dir, config, accelerator, card, command, state, live)
+            images = patches.mosaics
+            keeper = _Keeper(data_dir, images, run_dir, config, accelerator, card, command, state, live)
             for batch in feed:
                 rate = learning_rate(config, state.step)
                 loss, psnr = _step(accelerator, forward, net, optimizer, batch, rate, config)
@@ -129,6 +131,7 @@ class _Keeper:
     def __init__(
         self,
         data_dir: Path,
+        images: int,
         run_dir: Path,
         config: TrainConfig,
         accelerator: Accelerator,
@@ -140,7 +143,7 @@ class _Keeper:
         main = accelerator.is_main_process
         self._run_dir, self._config, self._state, self._live = run_dir, config, state, live
         self._validation = validation(held_out(data_dir, config) if main else (), config, accelerator.device)
-        self._card = card
+        self._card, self._images = card, images
         self._session = Session(run_dir, command, state.step, accelerator.num_processes, identity(data_dir))
         self._board = Board(run_dir, state.step, wanted=config.tensorboard and main)
 
@@ -167,14 +170,19 @@ class _Keeper:
     def _validate(self) -> None:
         state = self._state
         figures = self._validation.measure(state.average)
-        best = max((row[SELECTED] for row in state.validation if SELECTED in row), default=-np.inf)
-        state.validation.append({"step": state.step, **figures})
+        best = max(self._comparable(), default=-np.inf)
+        state.validation.append({"step": state.step, "images": self._images, **figures})
         self._board.write(state.step, {f"validation/{name}": value for name, value in figures.items()})
         if figures.get(SELECTED, np.inf) > best:
             self._session.save(state.step)
             self._model(MODEL_FILE)
         if SELECTED in figures:
             self._live.validated(figures[SELECTED])
+
+    def _comparable(self) -> list[float]:
+        """What networks had before on the images that are held out now: a dataset that grew holds out others."""
+        rows = (row for row in self._state.validation if row.get("images", self._images) == self._images)
+        return [row[SELECTED] for row in rows if SELECTED in row]
 
     def _save(self, net: torch.nn.Module, optimizer: torch.optim.Optimizer) -> None:
         state = self._state
@@ -240,6 +248,14 @@ def noise_left(estimate: Tensor, clean: Tensor, k: Tensor, sigma2: Tensor) -> Te
 def mean_psnr(estimate: Tensor, clean: Tensor) -> Tensor:
     """Mean over the patches of (B, 4, h, w) of their PSNR in dB, data range 1, linear RAW."""
     return -10 * torch.log10((estimate - clean).square().mean((1, 2, 3)) + 1e-12).mean()
+
+
+def _sizes_as_begun(run_dir: Path, config: TrainConfig) -> TrainConfig:
+    """`config`, with the sizes of images that the run in `run_dir` was begun with where it names none."""
+    file = run_dir / CONFIG_FILE
+    if config.shrink or not (file.is_file() and has_network(run_dir)):
+        return config
+    return replace(config, shrink=load_settings(TrainConfig, file).shrink)
 
 
 def _prepare_run(data_dir: Path, run_dir: Path, config: TrainConfig, initial: Denoiser | None) -> None:
