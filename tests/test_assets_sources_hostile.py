@@ -43,6 +43,11 @@ def refused(folder: Path) -> str:
     return reason
 
 
+def test_a_link_to_itself(tmp_path: Path) -> None:
+    (tmp_path / "loop.obj").symlink_to(tmp_path / "loop.obj")
+    refused(tmp_path)
+
+
 def gltf(**changes) -> dict:
     """A glTF document of one triangle."""
     data = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0)], "<f4").tobytes()

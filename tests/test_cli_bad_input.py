@@ -36,6 +36,7 @@ def folder(tmp_path: Path) -> Path:
     (tmp_path / "part.yaml").write_text("generate: 3")
     (tmp_path / "text.safetensors").write_text("not weights")
     (tmp_path / "empty").mkdir()
+    (tmp_path / "loop.dng").symlink_to(tmp_path / "loop.dng")
     np.save(tmp_path / "nan.npy", np.full((64, 64), np.nan, np.float32))
     Image.new("L", (64, 64)).save(tmp_path / "gray8.png")
     return tmp_path
@@ -113,6 +114,7 @@ CASES = [
     ("denoise {0}/none.dng {0}/out.dng --model {0}/none", "none"),
     ("denoise {0}/text.dng {0}/out.dng --model {0}/text.safetensors", "text.safetensors"),
     ("denoise {0}/empty {0}/out --model {0}/none", "empty"),
+    ("denoise {0}/text.dng {0}/loop.dng", "loop.dng"),
     ("denoise {0}/text.dng {0}/out.dng --model {0}/text.safetensors --strength -1", "text.safetensors"),
     ("export {0}/none {0}/out.onnx", "none"),
     ("export {0}/text.safetensors {0}/out.onnx", "text.safetensors"),

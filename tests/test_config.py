@@ -110,6 +110,12 @@ def test_a_mistake_is_one_line_that_names_the_key(override: str, named: str):
         ("1: 2", "no such key: 1"),
         ("count: 4\ncount: 5", "count is given twice"),
         ("inner: {rate: 2, rate: 3}", "rate is given twice"),
+        ("count: &a [*a]", "or for themselves"),
+        pytest.param(
+            "a0: &a0 [1]\n" + "".join(f"a{i}: &a{i} [{'*a%d,' % (i - 1) * 9}]\n" for i in range(1, 30)),
+            "too many values",
+            id="bomb",
+        ),
     ],
 )
 def test_a_broken_file_is_one_line_that_names_it(tmp_path: Path, text: str, words: str):

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, TypeVar, get_args, get_origin
@@ -27,6 +28,7 @@ Override = str | tuple[str, Any]
 """A text `key=value`, whose value is YAML, or a pair (key, value), whose value is taken as it is."""
 Layer = tuple[str, list[str], Any]
 """One setting: its source, the path of its key and its value."""
+_MOST_NODES = 1_000_000
 
 
 def _strict_int(value: Any, _: type) -> int:
@@ -211,6 +213,12 @@ def save_settings(settings: Any, file: Path) -> None:
 
 
 class _Loader(yaml.SafeLoader):
+    def get_single_node(self) -> yaml.Node | None:
+        node = super().get_single_node()
+        if node is not None and _nodes(node, {}) > _MOST_NODES:
+            raise yaml.YAMLError("its aliases stand for too many values, or for themselves")
+        return node
+
     def compose_mapping_node(self, anchor: Any) -> yaml.MappingNode:
         node = super().compose_mapping_node(anchor)
         seen = set()
@@ -222,6 +230,17 @@ class _Loader(yaml.SafeLoader):
                     )
                 seen.add((key.tag, key.value))
         return node
+
+
+def _nodes(node: yaml.Node, known: dict[int, float]) -> float:
+    """How many values there are with every alias written out; infinite where one holds itself."""
+    if isinstance(node, yaml.ScalarNode):
+        return 1
+    if id(node) not in known:
+        known[id(node)] = math.inf
+        pairs = node.value if isinstance(node, yaml.MappingNode) else [node.value]
+        known[id(node)] = 1 + sum(_nodes(item, known) for items in pairs for item in items)
+    return known[id(node)]
 
 
 def parse_yaml(text: str, source: str) -> Any:

@@ -55,6 +55,7 @@ DESCRIPTION = "RAW denoisers trained on nothing but rendered scenes: generate pa
 RESUMABLE = {"generate", "train", "experiment", "demo"}
 REPEATABLE = {"--model"}  # of evaluate
 FULL = (errno.ENOSPC, errno.EDQUOT)
+SYMLINK_LOOP = "Symlink loop"  # how the RuntimeError of Path.resolve begins
 EXTRAS = {
     "torch": "train",
     "accelerate": "train",
@@ -108,6 +109,10 @@ def _run(arguments: Sequence[str] | None) -> None:
         if error.filename is None:
             raise
         _fail(f"{error.filename}: {error.strerror}")
+    except RuntimeError as error:
+        if not str(error).startswith(SYMLINK_LOOP):
+            raise
+        _fail(str(error))
     except KeyboardInterrupt:
         goes_on = set(sys.argv[1:2] if arguments is None else arguments[:1]) & RESUMABLE
         hint = "; run the same command again to continue" if goes_on else ""
