@@ -207,7 +207,16 @@ def test_a_profile_is_shared_and_cannot_be_written_to_until_its_file_changes(tmp
         ("k: [1.0e-04", "k: [1.0e+300", r"levels\[0\]: k \+ sigma2"),
         ("k: [1.0e-04", "k: [.inf", r"levels\[0\].k must"),
         ("k: [1.0e-04", f"k: [1{'0' * 400}", r"levels\[0\].k must"),
-        ("sigma2: [1.0e-06", "sigma2: [2.0", r"levels\[0\]: k \+ sigma2"),
+        ("sigma2: [1.0e-06", "sigma2: [0.0834", r"levels\[0\].sigma2: 0.0834 is not below 1/12; is it in DN"),
+        ("cfa: RGGB", "cfa: RGGB\noptics: {f_number: 2, pixel_pitch_um: 1000}", "optics.pixel_pitch_um must"),
+        *(
+            (
+                "cfa: RGGB",
+                f"cfa: RGGB\noptics: {{f_number: 2, pixel_pitch_um: 1, {key}: {value}}}",
+                f"optics.{key} must",
+            )
+            for key, value in (("quantum_efficiency", 28), ("transmittance", 90), ("transmittance", 0))
+        ),
         ("sigma2: [1.0e-06", "sigma2: [-0.5", r"levels\[0\]: k \+ sigma2"),
         *(
             ("cfa: RGGB", f"cfa: RGGB\nxyz_to_camera: {matrices}", "xyz_to_camera")

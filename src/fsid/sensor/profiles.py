@@ -38,6 +38,12 @@ from fsid.sensor.terms import PAPER, NoiseTerms, parse_terms
 _REQUIRED = {"name", "camera", "cfa", "bits", "black_level", "white_level", "levels"}
 _OPTIONAL = {"source", "notes", "date", "xyz_to_camera", "law", "terms", "optics"}
 _MEASURED = {"k_error", "sigma2_error", "black", "frames", "dark_frames"}
+_OPTICS = {
+    "f_number": (0.5, 64.0, ""),
+    "pixel_pitch_um": (0.3, 50.0, " micrometres"),
+    "quantum_efficiency": (0.001, 1.0, ", electrons per photon"),
+    "transmittance": (0.001, 1.0, ", a share of the light"),
+}
 _LARGEST = 1e300  # of any number; beyond it are infinity and integers that are no float
 _FAR = 4.5  # times: two stops, and what tables of nominal ISOs are short of them
 _DN_TOLERANCE = 0.01  # k_dn and sigma2_dn repeat k and sigma2; they may differ by rounding only
@@ -207,6 +213,11 @@ def _levels(entries: Any, where: str, span: int) -> tuple[tuple[float, ...], np.
         sigma2.append(_site_values(entry, "sigma2", here, span**2))
         if min(k[-1]) <= 0:
             raise FsidError(f"{here}.k: the gain of every site must be positive")
+        if max(sigma2[-1]) >= ROUNDING_DN2:  # in DN^2 it could not be less
+            raise FsidError(
+                f"{here}.sigma2: {max(sigma2[-1]):g} is not below 1/12; is it in DN^2? It is to be divided "
+                f"by (white_level - black_level)^2 = {span**2}"
+            )
         if not all(0 < variance <= 1 for variance in np.add(k[-1], sigma2[-1])):
             raise FsidError(f"{here}: k + sigma2, the variance at white, must be above 0 and at most 1")
     if iso[0] <= 0 or any(b <= a for a, b in pairwise(iso)):
@@ -235,8 +246,10 @@ def _measurement(entries: list[dict[str, Any]], where: str) -> Measurement | Non
 def _optics(data: Any, where: str) -> Optics:
     _check_keys(data, where, {"f_number", "pixel_pitch_um"}, {"quantum_efficiency", "transmittance"})
     values = {key: _number(value, f"{where}.{key}") for key, value in data.items()}
-    if min(values.values()) <= 0:
-        raise FsidError(f"{where}: every value must be positive")
+    for key, value in values.items():
+        low, high, unit = _OPTICS[key]
+        if not low <= value <= high:
+            raise FsidError(f"{where}.{key} must be {low:g} to {high:g}{unit}; got {value:g}")
     return Optics(**values)
 
 

@@ -32,7 +32,9 @@ _VERSION = 3
 def cache_key(path: Path, member: str, referred: Sequence[Path] = ()) -> str:
     """Name of what is made from a file, and from those that it refers to, as they are now. OSError where
     there is none; the others may be missing."""
-    text = "|".join((f"{_VERSION}|{os.path.realpath(path)}|{_state(path)}|{member}", *map(_state_if_any, referred)))
+    text = "|".join(
+        (f"{_VERSION}|{os.path.realpath(path)}|{_state(path)}|{member}", *map(_state_if_any, referred))
+    )
     return hashlib.blake2b(text.encode(), digest_size=20).hexdigest()
 
 
