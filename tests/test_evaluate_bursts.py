@@ -130,6 +130,18 @@ def test_too_few_still_frames_for_the_noisy_ones_are_named(clean: Raw, tmp_path:
         burst_testset(tmp_path / "a", tmp_path / "set", frames=3)
 
 
+def test_a_frame_whose_noise_nothing_tells_is_named(clean: Raw, tmp_path: Path, monkeypatch):
+    def no_smooth_part(raw: Raw) -> None:
+        raise FsidError("no smooth part")
+
+    monkeypatch.setattr("fsid.evaluate.bursts.estimate_noise", no_smooth_part)
+    first, *_ = _burst(tmp_path / "captures/star/1lux", clean)
+    for path in first.parent.iterdir():
+        write_dng(path, replace(read_raw(path), noise=None))
+    with pytest.raises(FsidError, match=r"star/1lux/000\.dng: no smooth part; --camera names a profile"):
+        burst_testset(tmp_path / "captures", tmp_path / "out")
+
+
 def test_hidden_files_and_pictures_beside_the_raws_are_no_frames(clean: Raw, tmp_path: Path):
     paths = _burst(tmp_path / "captures" / "fabric" / "1lux", clean)
     for name in ("000.jpg", "000.xmp", "._000.dng"):

@@ -109,7 +109,7 @@ def burst_testset(
                 raw = _cut(read_raw(path), window)
                 name = name or raw.camera
                 target = root / scene / f"{level}.noisy{f'.{frame:02d}' if frame else ''}.dng"
-                write_dng(target, replace(raw, noise=_noise(raw, camera)))
+                write_dng(target, replace(raw, noise=_noise(raw, camera, path)))
             qualities.append(quality)
         progress(len(bursts), len(bursts))
         images = tuple(TestImage(scene, scene) for scene in scenes)
@@ -160,7 +160,8 @@ def _find_bursts(captures: Path, frames: int) -> dict[tuple[str, str], list[Path
     if not captures.is_dir():
         raise FsidError(f"{captures}: is not a folder of captures")
     found: dict[tuple[str, str], list[Path]] = {}
-    for folder in sorted(p for p in captures.glob("[!.]*/[!.]*") if p.is_dir()):
+    scenes = _folders(captures)  # not glob, which passes over a folder that it may not read
+    for folder in (level for scene in scenes for level in _folders(scene)):
         files = (p for p in folder.iterdir() if p.is_file() and not p.name.startswith("."))
         paths = sorted(p for p in files if p.suffix.lower() not in _BESIDE_RAW)
         if len(paths) < frames + LEAST_FRAMES:
@@ -174,6 +175,11 @@ def _find_bursts(captures: Path, frames: int) -> dict[tuple[str, str], list[Path
             f"{captures}: holds no bursts; expected <scene>/<level>/frames, for example star/0.5lux/"
         )
     return found
+
+
+def _folders(folder: Path) -> list[Path]:
+    """Those in a folder, sorted, hidden ones left out; OSError where it may not be read."""
+    return sorted(path for path in folder.iterdir() if path.is_dir() and not path.name.startswith("."))
 
 
 def _noisy_frames(paths: Sequence[Path], frames: int) -> list[Path]:
@@ -279,12 +285,15 @@ def _spread_over_site(variance: np.ndarray, cfa: str) -> np.ndarray:
     return np.maximum(out, 0)
 
 
-def _noise(raw: Raw, camera: str | Path) -> NoiseLevel:
+def _noise(raw: Raw, camera: str | Path, path: Path) -> NoiseLevel:
     if camera:
         return load_profile(camera).level(raw.iso)
     if raw.noise is not None:
         return raw.noise
-    return estimate_noise(raw).level
+    try:
+        return estimate_noise(raw).level
+    except FsidError as error:
+        raise FsidError(f"{path}: {error}; --camera names a profile of its noise") from None
 
 
 def _level_order(level: str) -> tuple[float, str]:
