@@ -112,7 +112,7 @@ def test_a_mistake_is_one_line_that_names_the_key(override: str, named: str):
         ("inner: {rate: 2, rate: 3}", "rate is given twice"),
         ("count: &a [*a]", "or for themselves"),
         pytest.param(
-            "a0: &a0 [1]\n" + "".join(f"a{i}: &a{i} [{'*a%d,' % (i - 1) * 9}]\n" for i in range(1, 30)),
+            "a0: &a0 [1]\n" + "".join(f"a{i}: &a{i} [{f'*a{i - 1},' * 9}]\n" for i in range(1, 30)),
             "too many values",
             id="bomb",
         ),

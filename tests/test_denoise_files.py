@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tifffile
+from scipy.ndimage import gaussian_filter
 
 torch = pytest.importorskip("torch")
 
@@ -33,6 +34,7 @@ from fsid.sensor import (  # noqa: E402
     write_dng,
 )
 from fsid.sensor.metadata import exposure_metadata  # noqa: E402
+from fsid.sensor.mosaic import pack, unpack  # noqa: E402
 
 PROFILE = load_profile("galaxy-s22")
 CARD = ModelCard(NetworkConfig(width=4), patch_px=32, training="nothing")
@@ -115,7 +117,7 @@ def test_the_noise_is_the_profile_s_or_the_file_s_or_the_image_s(tmp_path: Path)
 
 
 def test_strength(network: Path) -> None:
-    raw, model = noisy_raw(), load_model(network)
+    raw, model = noisy_raw(800), load_model(network)
     full = denoise_raw(raw, model).mosaic
     np.testing.assert_allclose(denoise_raw(raw, model, strength=0).mosaic, raw.mosaic, atol=1e-6)
     half = denoise_raw(raw, model, strength=0.5).mosaic
@@ -128,6 +130,19 @@ def test_strength(network: Path) -> None:
     for wrong in (-0.1, np.nan, np.inf, 1e200):
         with pytest.raises(FsidError, match="strength"):
             denoise_raw(raw, model, strength=wrong)
+
+
+@pytest.mark.parametrize("strength", [8, 20, 100])
+def test_the_strongest_smoothing_keeps_the_colours(strength: float) -> None:
+    rng = np.random.default_rng(0)
+    light = 0.2 + 0.15 * np.tanh(gaussian_filter(rng.standard_normal((64, 96)), 4) * 20)
+    packed = light * np.array([0.5, 1.0, 1.0, 0.6])[:, None, None]
+    mosaic = unpack(packed.astype(np.float32), PROFILE.cfa)
+    clean = Raw(mosaic, PROFILE.cfa, 64, 1023, (2, 1, 1.6), PROFILE.xyz_to_camera[0])
+    noisy = noisy_from_clean(rng, clean, 400, PROFILE.level(400))
+    smooth = denoise_raw(noisy, load_model("nafnet-small"), strength=strength)
+    means, true = (pack(raw.mosaic, raw.cfa).mean((1, 2)) for raw in (smooth, clean))
+    np.testing.assert_allclose(means, true, rtol=0.03)
 
 
 def test_a_folder_is_done_file_by_file(

@@ -49,7 +49,8 @@ def denoise(
         profile: Noise profile, a built-in name (fsid profiles) or a file; by default the file's own noise.
         iso: ISO of the profile's level; by default the file's, which the output keeps.
         strength: 0 to 1: share of the noise's amplitude to remove (1 all of it, less leaves grain). Above 1:
-            take the noise for that many times as strong, which smooths more (at most 100).
+            take the noise for that many times as strong, which smooths more, as far as the network keeps the
+            colours (at most 100).
         backend: What runs the network: torch (on a GPU where there is one) or onnx (onnxruntime, on the CPU);
             by default onnx for an .onnx file, else torch.
         cfa: Colours of a bare mosaic's first 2x2 pixels, read row by row: RGGB, BGGR, GRBG or GBRG.

@@ -28,6 +28,9 @@ from fsid.sensor.mosaic import pack, site_offsets, unpack
 from fsid.sensor.raw import NoiseLevel, Raw
 
 MAX_STRENGTH = 100.0
+MAX_TOLD = 0.0036
+"""Variance at mid-grey, 0.18, up to which a network is told of more noise than there is: k of 0.02. Far beyond
+what it was trained on it loses the colours; up to here the one that ships keeps them to 3 %."""
 TILE_PX = 512  # packed pixels: some 500 MB of activations for the small networks
 _POOLING_PATCHES = 16
 _WHOLE_UP_TO = 2  # image sides, in training patches, up to which it is pooled as a whole
@@ -64,17 +67,17 @@ def denoise_raw(
     """The clean estimate of `raw`, all metadata kept, `noise` None (what is left no longer follows the law).
 
     level: noise of `raw`; None takes `raw.noise`. strength: 0..1 is the share of the noise's amplitude that
-    is removed, so that grain is left below 1; above 1 the noise is taken to be that many times as strong,
-    which smooths more. tile_px: side of a tile in packed pixels, overlap excluded; memory grows with it, the
-    result does not depend on it. progress(done, tiles) is called after each tile. Raises FsidError where the
-    noise level is unknown or not physical, the strength below 0 or above `MAX_STRENGTH`, the mosaic holds NaN
-    or infinity, or the network makes such.
+    is removed, so that grain is left below 1; above 1 the noise is taken to be that many times as strong, up
+    to a variance of `MAX_TOLD`, which smooths more. tile_px: side of a tile in packed pixels, overlap
+    excluded; memory grows with it, the result does not depend on it. progress(done, tiles) is called after
+    each tile. Raises FsidError where the noise level is unknown or not physical, the strength below 0 or
+    above `MAX_STRENGTH`, the mosaic holds NaN or infinity, or the network makes such.
     """
     level = level if level is not None else raw.noise
     _check(raw, level, strength, tile_px)
     assert level is not None
     if strength > 1:
-        level = NoiseLevel(_times(level.k, strength**2), _times(level.sigma2, strength**2))
+        level = _stronger(level, strength**2)
     row, column = site_offsets(raw.cfa)[0]
     height, width = raw.mosaic.shape
     stride = model.multiple
@@ -89,6 +92,13 @@ def denoise_raw(
         mosaic *= np.float32(strength)
         mosaic += np.float32(1 - strength) * raw.mosaic
     return replace(raw, mosaic=mosaic, noise=None)
+
+
+def _stronger(level: NoiseLevel, times: float) -> NoiseLevel:
+    """Of so many times the variance, or as many as `MAX_TOLD` allows."""
+    at_grey = max(0.18 * k + sigma2 for k, sigma2 in zip(level.k, level.sigma2, strict=True))
+    times = min(times, max(MAX_TOLD / max(at_grey, 1e-12), 1.0))
+    return NoiseLevel(_times(level.k, times), _times(level.sigma2, times))
 
 
 def _times(values: tuple[float, float, float, float], factor: float) -> tuple[float, float, float, float]:

@@ -180,7 +180,7 @@ class _Keeper:
             self._live.validated(figures[SELECTED])
 
     def _comparable(self) -> list[float]:
-        """What networks had before on the images that are held out now: a dataset that grew holds out others."""
+        """PSNR of networks before on the images held out now: a dataset that grew holds out others."""
         rows = (row for row in self._state.validation if row.get("images", self._images) == self._images)
         return [row[SELECTED] for row in rows if SELECTED in row]
 
