@@ -29,7 +29,7 @@ from fsid.sensor.raw import NoiseLevel, Raw
 
 MAX_STRENGTH = 100.0
 MAX_TOLD = 0.0036
-"""Variance at mid-grey, 0.18, up to which a network is told of more noise than there is: k of 0.02. Far beyond
+"""Variance at mid-grey, 0.18, up to which a network is told of more noise than there is: k of 0.02. Beyond
 what it was trained on it loses the colours; up to here the one that ships keeps them to 3 %."""
 TILE_PX = 512  # packed pixels: some 500 MB of activations for the small networks
 _POOLING_PATCHES = 16
