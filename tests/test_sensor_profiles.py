@@ -250,6 +250,26 @@ def test_read_noise_that_is_negative_everywhere_is_refused(tmp_path, value, is_r
         load_profile(path)
 
 
+@pytest.mark.parametrize(("black", "white"), [(64, 1023), (64, 4095), (512, 16383)])
+def test_levels_are_the_same_after_saving_where_read_noise_is_that_of_rounding(tmp_path, black, white):
+    """Rounded to six digits, 1/12 DN^2 may come out below itself, which no camera can have."""
+    span = white - black
+    sigma2 = np.outer([1 / 12, 1 / 12, 1.2, 12.0], np.ones(4)) / span**2
+    made = replace(
+        load_profile("pixel6"),
+        black_level=black,
+        white_level=white,
+        bits=white.bit_length(),
+        iso=(100.0, 400.0, 800.0, 3200.0),
+        k=np.outer([0.11, 0.35, 0.65, 2.3], np.ones(4)) / span,
+        sigma2=sigma2,
+    )
+    save_profile(tmp_path / "made.yaml", made)
+    saved = load_profile(tmp_path / "made.yaml")
+    for iso in (50, 100, 200, 800, 1600, 6400):
+        np.testing.assert_allclose(_array(saved.level(iso)), _array(made.level(iso)), rtol=1e-5)
+
+
 def test_a_profile_of_numpy_numbers_is_saved(tmp_path):
     known = load_profile("pixel6")
     own = replace(known, iso=np.array(known.iso), black_level=np.int64(64), bits=np.uint8(10))

@@ -27,6 +27,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.optimize import nnls
 
 RELATIVE_ERROR = 0.1  # of a published value against the law, where no absolute error dominates
+DIGITS = 1e-5  # relative; a value this near the floor is the floor, written to the six digits of a file
 _REWEIGHTINGS = 10
 
 
@@ -59,6 +60,7 @@ def k_curve(iso: np.ndarray, k: np.ndarray) -> IsoCurve:
 
 def sigma2_curve(iso: np.ndarray, sigma2: np.ndarray, floor: float) -> IsoCurve:
     """sigma2 >= floor over ISO from a table: iso (n,) ascending, sigma2 (n, 4), impossible values allowed."""
+    sigma2 = np.where(abs(sigma2 - floor) <= DIGITS * floor, floor, sigma2)
     impossible = sigma2[sigma2 < floor]
     error = float(np.sqrt(np.mean((impossible - floor) ** 2))) if impossible.size else 0.0
     law = np.stack([sigma2_law(iso, site, floor, error) for site in sigma2.T], axis=1)
