@@ -11,6 +11,7 @@ import pytest
 from fsid.cli.iso_notes import note_extrapolation
 from fsid.errors import FsidError
 from fsid.sensor import far_extrapolated, load_profile, profile_names, save_profile
+from fsid.sensor.camera_profile import Measurement
 from fsid.sensor.iso_law import k_law, sigma2_law
 
 PUBLISHED = {
@@ -26,6 +27,21 @@ PUBLISHED = {
     "galaxy-s22-ultra": "galaxy_s22ultra/wide",
     "galaxy-s22-ultra-tele": "galaxy_s22ultra/tele2",
     "galaxy-s22-ultra-ultrawide": "galaxy_s22ultra/ultrawide",
+}
+
+MEAN_LOG_LEVELS = {  # of k and of sigma2, over 200 ISOs from 25 to 25600
+    "galaxy-s20-fe": (-6.760102611382334, -12.144657591559419),
+    "galaxy-s20-ultra": (-7.932737417195142, -12.796608266609056),
+    "galaxy-s22": (-6.7397378393863825, -10.846192736773947),
+    "galaxy-s22-plus-front": (-6.120475934169915, -10.592148474309727),
+    "galaxy-s22-plus-tele": (-5.601133645986758, -9.765594309329995),
+    "galaxy-s22-plus-ultrawide": (-6.374636468752165, -10.691074673089595),
+    "galaxy-s22-ultra": (-6.886048054750856, -11.602892681157323),
+    "galaxy-s22-ultra-tele": (-5.66646360202315, -10.040957143383677),
+    "galaxy-s22-ultra-ultrawide": (-6.055210686644049, -10.863927372640813),
+    "pixel6": (-7.157334655308939, -12.818826286197375),
+    "pixel9-pro": (-7.278634204143639, -12.952308507483936),
+    "pixel9-pro-tele": (-6.181659754092835, -11.093459572210689),
 }
 
 GOOD = """
@@ -107,6 +123,40 @@ def test_published_read_noise_is_kept_where_it_is_possible():
     profile = load_profile("galaxy-s22")
     for iso, sigma2 in list(zip(profile.iso, profile.sigma2, strict=True))[3:]:
         np.testing.assert_allclose(profile.level(iso).sigma2, sigma2, rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", MEAN_LOG_LEVELS)
+def test_published_tables_give_the_levels_that_they_always_gave(name):
+    profile = load_profile(name)
+    levels = [_array(profile.level(iso)) for iso in np.geomspace(25, 25600, 200)]
+    np.testing.assert_allclose(np.log(levels).mean(axis=(0, 2)), MEAN_LOG_LEVELS[name], rtol=1e-13)
+
+
+def _calibrated(sigma2_dn2, error_dn2):
+    """A profile of ISO 200, 400, ... with these sigma2 in DN^2, and their standard errors where given."""
+    known, isos = load_profile("pixel6"), 200 * 2 ** np.arange(len(sigma2_dn2))
+    k = np.outer(0.8e-6 * isos, np.ones(4))
+    sigma2, error = (np.outer(v, np.ones(4)) / known.span**2 for v in (sigma2_dn2, error_dn2))
+    measured = Measurement(0.001 * k, error, 0 * k + 64, (20,) * len(k), (10,) * len(k))
+    return replace(known, iso=tuple(isos), k=k, sigma2=sigma2, measured=measured)
+
+
+def _sigma2_dn2(profile, isos):
+    return [profile.level(iso).sigma2[0] * profile.span**2 for iso in isos]
+
+
+def test_read_noise_that_another_conversion_gain_lowers_is_kept():
+    found = _calibrated([1.6, 6.0, 1.2, 4.0], [0.02, 0.06, 0.02, 0.04])
+    isos = found.iso
+    np.testing.assert_allclose(_sigma2_dn2(found, isos), [1.6, 6.0, 1.2, 4.0])
+    assert np.all(np.diff(_sigma2_dn2(found, np.geomspace(400, 800, 9))) < 0)
+    np.testing.assert_allclose(_sigma2_dn2(replace(found, measured=None), isos), [1.4, 3.6, 3.6, 5.0])
+
+
+def test_read_noise_that_falls_within_its_errors_is_pooled_by_them():
+    found = _calibrated([0.1, 0.5, 1.0, 0.7, 4.0], [0.001, 0.001, 0.2, 0.1, 0.1])
+    pooled = (1.0 + 4 * 0.7) / 5
+    np.testing.assert_allclose(_sigma2_dn2(found, found.iso), [0.1, 0.5, pooled, pooled, 4.0])
 
 
 def test_impossible_read_noise_becomes_the_quadratic_of_its_trustworthy_end():

@@ -82,7 +82,7 @@ class CameraProfile:
         return self.white_level - self.black_level
 
     def level(self, iso: float) -> NoiseLevel:
-        """Noise at any ISO > 0, monotone and continuous in ISO; see `iso_law` for what is believed where."""
+        """Noise at any ISO > 0, continuous in ISO; see `iso_law` for what is believed where."""
         if not (np.isfinite(iso) and iso > 0):
             raise FsidError(f"profile {self.name}: ISO {iso} is not a positive number")
         k, sigma2 = self.curves
@@ -92,7 +92,12 @@ class CameraProfile:
     def curves(self) -> tuple[IsoCurve, IsoCurve]:
         """k and sigma2 over ISO."""
         iso, floor = np.array(self.iso), ROUNDING_DN2 / self.span**2
-        return k_curve(iso, self.k), sigma2_curve(iso, self.sigma2, floor)
+        if self.measured is None:
+            return k_curve(iso, self.k), sigma2_curve(iso, self.sigma2, floor)
+        return (
+            k_curve(iso, self.k, self.measured.k_error),
+            sigma2_curve(iso, self.sigma2, floor, self.measured.sigma2_error),
+        )
 
 
 def _four(values: np.ndarray) -> tuple[float, float, float, float]:

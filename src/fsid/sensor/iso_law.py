@@ -8,13 +8,17 @@ between two such lines), so the table is believed where it exists and the law ca
 
 - between table points: monotone cubic through log(value) over log(ISO) (Fritsch & Carlson 1980);
 - outside: the law, scaled to join the last point;
-- a value that falls while ISO rises is a fit's error: it is averaged with its neighbours until none falls.
+- a published value that falls while ISO rises is a fit's error: it is averaged with its neighbours until none
+  falls;
+- where a table states standard errors, as a calibrated one does, neighbours that fall within three errors of
+  their difference are pooled, weighted by their errors (Ayer et al. 1955). A fall beyond them is the
+  camera's: another conversion gain, with less read noise. It is kept, and so is all that does not fall.
 
 sigma2 below the rounding noise of the converter, 1/12 DN^2, is impossible for an image made of integers; a
 published table holds such values, even negative ones, when its intercepts were fitted without that bound.
 The size of the impossible values is then the size of the error of all intercepts of that camera, and the
 points carry no more than a trend: the law, fitted with that error in its weights, replaces the whole table.
-Both results are monotone and continuous in ISO, and never below the floor.
+Results are continuous in ISO, never below the floor, and monotone but for such falls.
 """
 
 from __future__ import annotations
@@ -28,6 +32,7 @@ from scipy.optimize import nnls
 
 RELATIVE_ERROR = 0.1  # of a published value against the law, where no absolute error dominates
 DIGITS = 1e-5  # relative; a value this near the floor is the floor, written to the six digits of a file
+SIGNIFICANT = 3.0  # standard errors of a difference, beyond which a fall is real
 _REWEIGHTINGS = 10
 
 
@@ -52,20 +57,25 @@ class IsoCurve:
         return np.exp(self.inside(np.log(nearest))) * polyval(iso, self.law) / polyval(nearest, self.law)
 
 
-def k_curve(iso: np.ndarray, k: np.ndarray) -> IsoCurve:
-    """k over ISO from a table: iso (n,) ascending, k (n, 4) > 0."""
+def k_curve(iso: np.ndarray, k: np.ndarray, error: np.ndarray | None = None) -> IsoCurve:
+    """k over ISO from a table: iso (n,) ascending, k (n, 4) > 0, error (n, 4) standard errors if known."""
     law = np.stack([k_law(iso, site) for site in k.T], axis=1)
-    return IsoCurve(iso[0], iso[-1], _inside(iso, k), law)
+    return IsoCurve(iso[0], iso[-1], _inside(iso, k, error), law)
 
 
-def sigma2_curve(iso: np.ndarray, sigma2: np.ndarray, floor: float) -> IsoCurve:
-    """sigma2 >= floor over ISO from a table: iso (n,) ascending, sigma2 (n, 4), impossible values allowed."""
+def sigma2_curve(
+    iso: np.ndarray, sigma2: np.ndarray, floor: float, error: np.ndarray | None = None
+) -> IsoCurve:
+    """sigma2 >= floor over ISO from a table: iso (n,) ascending, sigma2 (n, 4), impossible values allowed.
+
+    error: (n, 4) standard errors, None where the table states none.
+    """
     sigma2 = np.where(abs(sigma2 - floor) <= DIGITS * floor, floor, sigma2)
     impossible = sigma2[sigma2 < floor]
-    error = float(np.sqrt(np.mean((impossible - floor) ** 2))) if impossible.size else 0.0
-    law = np.stack([sigma2_law(iso, site, floor, error) for site in sigma2.T], axis=1)
+    absolute = float(np.sqrt(np.mean((impossible - floor) ** 2))) if impossible.size else 0.0
+    law = np.stack([sigma2_law(iso, site, floor, absolute) for site in sigma2.T], axis=1)
     law[0] += floor
-    return IsoCurve(iso[0], iso[-1], None if impossible.size else _inside(iso, sigma2), law)
+    return IsoCurve(iso[0], iso[-1], None if impossible.size else _inside(iso, sigma2, error), law)
 
 
 def k_law(iso: np.ndarray, k: np.ndarray) -> np.ndarray:
@@ -81,8 +91,14 @@ def sigma2_law(iso: np.ndarray, sigma2: np.ndarray, floor: float, error: float) 
     return _nonnegative_fit(iso, sigma2 - floor, powers=(2, 0, 1), error=max(error, floor))
 
 
-def _inside(iso: np.ndarray, values: np.ndarray) -> PchipInterpolator | None:
-    return PchipInterpolator(np.log(iso), np.log(_rising(values))) if len(iso) > 1 else None
+def _inside(iso: np.ndarray, values: np.ndarray, error: np.ndarray | None) -> PchipInterpolator | None:
+    if len(iso) == 1:
+        return None
+    if error is None:
+        believed = _rising(values)
+    else:
+        believed = np.stack([_pooled(*site) for site in zip(values.T, error.T, strict=True)], axis=1)
+    return PchipInterpolator(np.log(iso), np.log(believed))
 
 
 def _rising(values: np.ndarray) -> np.ndarray:
@@ -90,6 +106,21 @@ def _rising(values: np.ndarray) -> np.ndarray:
     above = np.maximum.accumulate(values, axis=0)
     below = np.minimum.accumulate(values[::-1], axis=0)[::-1]
     return (above + below) / 2
+
+
+def _pooled(values: np.ndarray, error: np.ndarray) -> np.ndarray:
+    """(n,) `values` in 0..1; neighbours that fall within their standard `error` (n,) have their mean."""
+    pools: list[tuple[float, float, int]] = []  # mean, its variance, number of values
+    for mean, variance in zip(values, np.clip(np.abs(error), DIGITS * values, 1) ** 2, strict=True):
+        count = 1
+        while pools and 0 < pools[-1][0] - mean <= SIGNIFICANT * np.sqrt(pools[-1][1] + variance):
+            before, variance_before, more = pools.pop()
+            mean = (variance_before * mean + variance * before) / (variance + variance_before)
+            variance *= variance_before / (variance + variance_before)
+            count += more
+        pools.append((mean, variance, count))
+    means, _, counts = zip(*pools, strict=True)
+    return np.repeat(means, counts)
 
 
 def _nonnegative_fit(
