@@ -13,6 +13,7 @@ from fsid.sensor import (
     NoiseLevel,
     NoiseTerms,
     Raw,
+    TemporalStatistics,
     add_noise_terms,
     calibrate,
     load_profile,
@@ -22,7 +23,9 @@ from fsid.sensor import (
     write_dng,
 )
 from fsid.sensor.metadata import exposure_metadata
+from fsid.sensor.mosaic import unpack
 from fsid.sensor.poisson import poisson
+from fsid.sensor.terms_fit import dark_finding, prnu_of
 
 LEVEL = NoiseLevel(k=(2e-3, 2e-3, 2e-3, 2e-3), sigma2=(4e-5, 4e-5, 4e-5, 4e-5))
 SIDE, FRAMES = 128, 40
@@ -234,6 +237,35 @@ def test_terms_are_those_of_short_dark_frames(tmp_path, rng):
             write_dng(tmp_path / name / f"{number:03d}.dng", noisy)
     found = calibrate([tmp_path / "light"], name="p", dark=[tmp_path / "a", tmp_path / "b"], terms=True)
     assert found.profile.terms.row == pytest.approx(0.15, rel=0.2)
+
+
+def _dark_and_flat(rng, level, terms, light, frames=30, side=128):
+    """Statistics of dark frames and of a grey card, whose sites R, Gr, Gb, B have these signals."""
+    sites = np.broadcast_to(np.float32(light)[:, None, None], (4, side // 2, side // 2))
+    card = replace(flat(0.0, side), mosaic=unpack(sites, "RGGB"))
+    dark, lit = TemporalStatistics(1023, dark=True), TemporalStatistics(1023)
+    for _ in range(frames):
+        for stats, clean in ((dark, flat(0.0, side)), (lit, card)):
+            stats.add(to_dn(noisy_from_clean(rng, clean, 800, level, terms)))
+    return dark, lit
+
+
+def test_sites_of_different_noise_make_no_tail(rng):
+    """One kurtosis for four normal distributions of these variances would be 3."""
+    level = NoiseLevel(LEVEL.k, (4e-5, 1e-5, 1e-5, 6e-5))
+    for tail in (0.0, 0.8):
+        dark, _ = _dark_and_flat(rng, level, NoiseTerms(tail=tail), (0.1,) * 4)
+        assert dark_finding(dark, 800, 0.01).terms.tail == pytest.approx(tail, abs=0.1)
+
+
+@pytest.mark.parametrize("light", [(0.2, 0.4, 0.4, 0.3), (0.4, 0.15, 0.15, 0.25)])
+@pytest.mark.parametrize("side", [128, 144])
+def test_the_gain_pattern_of_a_grey_card_is_found_though_its_sites_differ(rng, light, side):
+    """Set against the mean signal, the median of all steps made it a sixth too weak."""
+    level = NoiseLevel((3e-4,) * 4, (2e-6,) * 4)
+    for prnu in (0.008, 0.0):
+        _, lit = _dark_and_flat(rng, level, NoiseTerms(prnu=prnu), light, side=side)
+        assert prnu_of(lit, 64.0, 0.0) == pytest.approx(prnu, rel=0.1)
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -9,6 +9,10 @@ so the noise of frames counts as they have it, and mean and variance are both th
 A block that still differs afterwards, and by enough to count as noise, has moved: it is left out, and where a
 quarter moved the burst is refused.
 
+The noise of dark frames is counted for each place in the 2x2 tile of the filters by itself: a camera's sites
+differ in noise, and four normal distributions of different width make one with a tail. A sensor without
+filters has four such places, all alike.
+
 Sums count from the first frame, so that they stay small. Memory is 22 bytes per pixel, however many frames.
 """
 
@@ -30,6 +34,7 @@ CONTAMINATION = 0.1  # of a pixel's noise variance, from which on a changed bloc
 STUCK = 0.9  # of the frames at 0 or white; what noise carries there less often still tells its variance
 LARGEST_CORRELATION = 0.1  # between the changes of neighbours; noise has none
 _BANDING = 0.1  # of the noise that rows or columns may have in common
+TILE = tuple(np.s_[row::2, column::2] for row in (0, 1) for column in (0, 1))  # sites, whatever their colour
 _GRID = 8
 _THINNING = 4
 _MIN_BLOCK_SIDE_PX = 8
@@ -42,7 +47,8 @@ _MIN_CONTRAST = 100.0  # variance between blocks over their noise; below it the 
 class ReadStatistics:
     """Parts of the noise of a burst in DN^2: of a pixel, of its rows and of its columns; excess kurtosis.
 
-    level_dn2: variance of the frames' levels, as a drifting black level has it.
+    pixel_dn2, excess_kurtosis: mean over the sites. level_dn2: variance of the frames' levels, as a drifting
+    black level has it.
     """
 
     pixel_dn2: float
@@ -154,12 +160,14 @@ class TemporalStatistics:
     def read_statistics(self) -> ReadStatistics:
         """What the noise is made of; for bursts of dark frames."""
         self._check()
-        pixel, fourth, row, column = self._noise / (self.frames - 1)
+        second, fourth = self._moments / (self.frames - 1)
+        row, column = self._banding / (self.frames - 1)
+        kurtosis = fourth[second > 0] / second[second > 0] ** 2
         return ReadStatistics(
-            pixel_dn2=pixel / 2,
+            pixel_dn2=float(second.mean()) / 2,
             row_dn2=max(row / 2, 0.0),
             column_dn2=max(column / 2, 0.0),
-            excess_kurtosis=2 * (fourth / pixel**2 - 3) if pixel > 0 else 0.0,
+            excess_kurtosis=2 * (float(kurtosis.mean()) - 3) if kurtosis.size else 0.0,
             level_dn2=float(np.var(self.offsets_dn)) if self.frames > 2 else 0.0,
         )
 
@@ -182,9 +190,11 @@ class TemporalStatistics:
         self._first = dn.astype(np.uint16)
         self._sum, self._squares = np.zeros(dn.shape), np.zeros(dn.shape)
         self._zeros, self._whites = np.zeros(dn.shape, np.uint16), np.zeros(dn.shape, np.uint16)
-        self._noise = np.zeros(4)  # sums over frames: d^2, d^4, variance of row means, of column means
+        self._moments = np.zeros((2, len(TILE)))  # sums over frames: mean d^2 and d^4 of each site
+        self._banding = np.zeros(2)  # sums over frames: variance of row means, of column means
         rows, columns = (max(1, min(_GRID, side // _MIN_BLOCK_SIDE_PX)) for side in dn.shape)
-        self._block = dn.shape[0] // rows, dn.shape[1] // columns
+        height, width = dn.shape[0] // rows, dn.shape[1] // columns
+        self._block = max(height // 2 * 2, 1), max(width // 2 * 2, 1)  # as much of each site in every block
         self._moved = np.zeros((rows, columns), bool)
         self._reference = self._blocks(self._first, np.mean)
 
@@ -223,9 +233,9 @@ class TemporalStatistics:
         squares = d * d
         pixel = float(squares.mean())
         rows, columns = d.mean(axis=1), d.mean(axis=0)
-        squares *= squares
-        fourth = float(squares.mean())
-        self._noise += (pixel, fourth, rows.var() - pixel / width, columns.var() - pixel / height)
+        self._banding += rows.var() - pixel / width, columns.var() - pixel / height
+        for row, power in enumerate((squares, squares * squares)):
+            self._moments[row] += [power[site].mean() for site in TILE]
 
 
 def _check_dn(dn: np.ndarray, name: str) -> None:

@@ -8,9 +8,11 @@
 
 All but the dark current are those of an ISO's shortest dark frames: longer ones hold its shot noise, too.
 
-Spatial variance is that of differences between neighbours of the same colour: vignetting is smooth and
-cancels. A term that does not stand out of its own error is left off. Poisson statistics and quantisation are
-no measurements: they are how sensors work, and stay the user's choice.
+Spatial variance is that of differences between neighbours of the same site: vignetting is smooth and cancels.
+Every site is measured by itself. Its pattern counts in DN^2, and the mean over the sites is set against that
+of their noise, or of their squared signals, which differ even on a grey card. A term that does not stand out
+of its own error is left off. Poisson statistics and quantisation are no measurements: they are how sensors
+work, and stay the user's choice.
 """
 
 from __future__ import annotations
@@ -21,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fsid.sensor.calibrate import RESOLVED_DN2
-from fsid.sensor.temporal import TemporalStatistics
+from fsid.sensor.temporal import TILE, TemporalStatistics
 from fsid.sensor.terms import NoiseTerms
 
 FLAT = 0.1  # contrast of an evenly lit burst, relative to its signal; beyond it texture looks like PRNU
@@ -49,10 +51,9 @@ def dark_finding(stats: TemporalStatistics, iso: float, exposure_s: float) -> Da
         return None
     mean = stats.mean()
     left = found.pixel_dn2 / stats.frames
-    steps = mean[:, 2:] - mean[:, :-2]
-    spread = float(np.median(np.abs(steps))) / _GAUSS_MAD
-    fixed2 = max(spread**2 / 2 - left, 0.0)
-    far = np.abs(mean - np.median(mean)) > FAR * max(spread, 0.1)
+    spread2 = _spread2(mean)
+    fixed2 = max(spread2 - left, 0.0)
+    far = np.abs(mean - np.median(mean)) > FAR * max(np.sqrt(2 * spread2), 0.1)
     terms = NoiseTerms(
         row=_standing_out(found.row_dn2 / found.pixel_dn2),
         column=_standing_out(found.column_dn2 / found.pixel_dn2),
@@ -74,10 +75,10 @@ def prnu_of(stats: TemporalStatistics, black_dn: float, fixed_dn2: float) -> flo
         return None
     mean = stats.mean()
     variance = np.concatenate([site[1] for site in stats.sites(None)])
-    spread = float(np.median(np.abs(mean[:, 2:] - mean[:, :-2]))) / _GAUSS_MAD
     left = float(np.mean(variance)) / stats.frames
-    pattern2 = spread**2 / 2 - left - fixed_dn2
-    return float(np.sqrt(pattern2)) / signal if pattern2 > 0.1 * left else 0.0
+    pattern2 = _spread2(mean) - left - fixed_dn2
+    signal2 = float(np.mean([(mean[site].mean() - black_dn) ** 2 for site in TILE]))
+    return float(np.sqrt(pattern2 / signal2)) if pattern2 > 0.1 * left else 0.0
 
 
 def fit_terms(
@@ -105,6 +106,12 @@ def shortest_dark(dark: Sequence[DarkFinding], iso: float) -> DarkFinding | None
     """The dark burst of an ISO that holds least dark current; None where it has none."""
     of_iso = [found for found in dark if found.iso == iso]
     return min(of_iso, key=lambda found: (found.exposure_s, found.level_dn), default=None)
+
+
+def _spread2(mean: np.ndarray) -> float:
+    """Variance in DN^2 of a pixel among its neighbours in `mean` (H, W), the mean over the sites."""
+    steps = [mean[site][:, 1:] - mean[site][:, :-1] for site in TILE]
+    return float(np.mean([(np.median(np.abs(step)) / _GAUSS_MAD) ** 2 / 2 for step in steps]))
 
 
 def _dark_current(dark: Sequence[DarkFinding], k_dn_at_iso: dict[float, float]) -> float:
