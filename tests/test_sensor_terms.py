@@ -258,6 +258,20 @@ def test_sites_of_different_noise_make_no_tail(rng):
         assert dark_finding(dark, 800, 0.01).terms.tail == pytest.approx(tail, abs=0.1)
 
 
+@pytest.mark.parametrize("share", [0.0, 0.002])
+def test_dark_shading_is_no_defect_and_hot_pixels_in_it_are(rng, share):
+    """From corner to corner 12 DN, ten times the noise; the sites' black levels differ by 20 DN."""
+    side, stats = 256, TemporalStatistics(1023, dark=True)
+    level = 64 + 12 * np.linspace(0, 1, side) ** 4 + np.linspace(0, 4, side)[:, None]
+    level[1::2, ::2] += 20
+    level[rng.random(level.shape) < share] += 100
+    for _ in range(20):
+        stats.add(np.rint(level + 1.2 * rng.normal(size=level.shape)).astype(np.uint16))
+    found = dark_finding(stats, 400, 0.1)
+    assert found.terms.defective == np.mean(level > 150)
+    assert found.terms.fixed == 0
+
+
 @pytest.mark.parametrize("light", [(0.2, 0.4, 0.4, 0.3), (0.4, 0.15, 0.15, 0.25)])
 @pytest.mark.parametrize("side", [128, 144])
 def test_the_gain_pattern_of_a_grey_card_is_found_though_its_sites_differ(rng, light, side):

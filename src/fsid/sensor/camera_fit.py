@@ -66,7 +66,7 @@ def calibrate(
     """
     found = find_frames(list(map(Path, paths)), list(map(Path, dark)), layout)
     isos = sorted({frame.iso for frame in found.frames})
-    reader = _Reader(found, layout, progress)
+    reader = _Reader(found, layout, progress, terms=terms)
     fits = [_fit_iso(reader, iso, tie_greens) for iso in isos]
     seen = found.camera
     profile = profile_of(
@@ -90,8 +90,9 @@ def calibrate(
 class _Reader:
     """Streams bursts, counts the frames for the progress bar, and keeps what is worth a note."""
 
-    def __init__(self, found: FrameSet, layout: Layout, progress: Progress | None) -> None:
+    def __init__(self, found: FrameSet, layout: Layout, progress: Progress | None, *, terms: bool) -> None:
         self.found, self._layout, self._progress = found, layout, progress
+        self.terms = terms  # wanted: they take seconds per burst of a full frame
         self.drifts_dn: list[float] = []  # of bursts that drifted
         self.moved: list[Path] = []
         self.saturated: list[Path] = []
@@ -110,7 +111,7 @@ class _Reader:
                 f"{burst[0].path}: the only frame of its {alone}; a burst needs the same picture "
                 f"several times: add frames or leave it out"
             )
-        stats = TemporalStatistics(self.found.camera.white_level, dark=dark)
+        stats = TemporalStatistics(self.found.camera.white_level, dark=dark and self.terms)
         for frame in burst:
             stats.add(self.found.read(frame, self._layout), str(frame.path))
             self._done += 1
@@ -167,7 +168,7 @@ def _pool_dark(reader: _Reader, iso: float, frames: list[Frame]) -> tuple[np.nda
     for number, burst in enumerate(shortest_first):
         stats = reader.statistics(burst, dark=True)
         _check_dark(stats, burst[0].path, camera.black_level, camera.white_level)
-        if (finding := dark_finding(stats, iso, burst[0].exposure_s)) is not None:
+        if reader.terms and (finding := dark_finding(stats, iso, burst[0].exposure_s)) is not None:
             reader.dark.append(finding)
         if stats.zero_share > CUT_OFF:
             reader.cut_off.append(iso)
@@ -207,7 +208,7 @@ def _pool_lights(reader: _Reader, iso: float, frames: list[Frame], black: np.nda
             raise FsidError(f"{burst[0].path}: {error}") from error
         if all(site.used.any() for site in samples):
             usable = True
-            if (prnu := prnu_of(stats, float(black.mean()), fixed_dn2)) is not None:
+            if reader.terms and (prnu := prnu_of(stats, float(black.mean()), fixed_dn2)) is not None:
                 reader.prnu.append(prnu)
         else:
             reader.saturated.append(burst[0].path)

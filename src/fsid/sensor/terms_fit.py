@@ -4,7 +4,7 @@
     tail, drift         kurtosis of the changes of dark pixels; variance of the frames' levels
     fixed, prnu         spatial variance of the mean image, dark or evenly lit, less the noise left in it
     dark_current_e_s    slope of the dark level over exposure time, in electrons (k DN each)
-    defective           share of dark pixels far from their neighbours
+    defective           share of dark pixels far from the median of their 5x5 neighbours of the same site
 
 All but the dark current are those of an ISO's shortest dark frames: longer ones hold its shot noise, too.
 
@@ -21,6 +21,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from fsid.sensor.calibrate import RESOLVED_DN2
 from fsid.sensor.temporal import TILE, TemporalStatistics
@@ -29,6 +30,7 @@ from fsid.sensor.terms import NoiseTerms
 FLAT = 0.1  # contrast of an evenly lit burst, relative to its signal; beyond it texture looks like PRNU
 CUT_OFF = 0.002  # of the dark values at DN 0, from which on noise is no longer symmetric
 FAR = 10.0  # robust standard deviations: a defective pixel
+_AROUND = 5  # pixels of the same site, the side of a neighbourhood
 _STANDING_OUT = 0.02  # share of the noise from which on a term is worth having
 _GAUSS_MAD = 0.6745  # median absolute deviation of a standard normal number
 
@@ -53,7 +55,7 @@ def dark_finding(stats: TemporalStatistics, iso: float, exposure_s: float) -> Da
     left = found.pixel_dn2 / stats.frames
     spread2 = _spread2(mean)
     fixed2 = max(spread2 - left, 0.0)
-    far = np.abs(mean - np.median(mean)) > FAR * max(np.sqrt(2 * spread2), 0.1)
+    far = _from_around(mean) > FAR * max(np.sqrt(2 * spread2), 0.1)
     terms = NoiseTerms(
         row=_standing_out(found.row_dn2 / found.pixel_dn2),
         column=_standing_out(found.column_dn2 / found.pixel_dn2),
@@ -112,6 +114,14 @@ def _spread2(mean: np.ndarray) -> float:
     """Variance in DN^2 of a pixel among its neighbours in `mean` (H, W), the mean over the sites."""
     steps = [mean[site][:, 1:] - mean[site][:, :-1] for site in TILE]
     return float(np.mean([(np.median(np.abs(step)) / _GAUSS_MAD) ** 2 / 2 for step in steps]))
+
+
+def _from_around(mean: np.ndarray) -> np.ndarray:
+    """(H, W) DN between `mean` (H, W) and its local median, to which smooth shading belongs."""
+    distance = np.empty_like(mean)
+    for site in TILE:
+        distance[site] = np.abs(mean[site] - median_filter(mean[site], _AROUND))
+    return distance
 
 
 def _dark_current(dark: Sequence[DarkFinding], k_dn_at_iso: dict[float, float]) -> float:
