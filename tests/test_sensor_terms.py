@@ -272,6 +272,15 @@ def test_dark_shading_is_no_defect_and_hot_pixels_in_it_are(rng, share):
     assert found.terms.fixed == 0
 
 
+@pytest.mark.parametrize("sigma_dn", [0.8, 1.0])
+def test_means_of_few_integers_show_no_fixed_pattern(rng, sigma_dn):
+    """Their steps are multiples of 0.1 DN; the median of those of 0.36 DN is 0.3 or 0.4."""
+    stats = TemporalStatistics(1023, dark=True)
+    for _ in range(10):
+        stats.add(np.rint(64.3 + sigma_dn * rng.normal(size=(256, 256))).astype(np.uint16))
+    assert dark_finding(stats, 400, 0.1).terms.fixed == 0
+
+
 @pytest.mark.parametrize("light", [(0.2, 0.4, 0.4, 0.3), (0.4, 0.15, 0.15, 0.25)])
 @pytest.mark.parametrize("side", [128, 144])
 def test_the_gain_pattern_of_a_grey_card_is_found_though_its_sites_differ(rng, light, side):

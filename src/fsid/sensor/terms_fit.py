@@ -33,6 +33,9 @@ FAR = 10.0  # robust standard deviations: a defective pixel
 _AROUND = 5  # pixels of the same site, the side of a neighbourhood
 _STANDING_OUT = 0.02  # share of the noise from which on a term is worth having
 _GAUSS_MAD = 0.6745  # median absolute deviation of a standard normal number
+_CUT = 3.0  # standard deviations, beyond which a step is an edge or a defect
+_LEFT_BY_CUT = 0.9733  # of the variance of a normal number, within the cut
+_REWEIGHTINGS = 10
 
 
 @dataclass(frozen=True)
@@ -113,7 +116,20 @@ def shortest_dark(dark: Sequence[DarkFinding], iso: float) -> DarkFinding | None
 def _spread2(mean: np.ndarray) -> float:
     """Variance in DN^2 of a pixel among its neighbours in `mean` (H, W), the mean over the sites."""
     steps = [mean[site][:, 1:] - mean[site][:, :-1] for site in TILE]
-    return float(np.mean([(np.median(np.abs(step)) / _GAUSS_MAD) ** 2 / 2 for step in steps]))
+    return float(np.mean([_variance_without_outliers(step) / 2 for step in steps]))
+
+
+def _variance_without_outliers(steps: np.ndarray) -> float:
+    """Mean square of `steps` but for outliers.
+
+    Means of a few integers are multiples of 1/frames, among which a median jumps by more than what is sought.
+    """
+    square = steps**2
+    found = float(np.median(square)) / _GAUSS_MAD**2
+    for _ in range(_REWEIGHTINGS):
+        within = square[square <= _CUT**2 * found]
+        found = float(within.mean()) / _LEFT_BY_CUT if within.size else found
+    return found
 
 
 def _from_around(mean: np.ndarray) -> np.ndarray:
