@@ -176,6 +176,23 @@ def test_black_levels_of_each_site_are_subtracted_each(tmp_path, side):
     np.testing.assert_allclose(back.mosaic, 1 / (1023 - back.black_level), rtol=1e-4)
 
 
+@pytest.mark.parametrize(("top", "left"), [(2, 4), (3, 4), (2, 5), (3, 5)])
+def test_black_levels_and_crop_count_from_the_active_area(tmp_path, top, left):
+    """1 DN of light over black levels of each site, inside masked margins of any parity."""
+    blacks = np.array([[60, 64], [68, 76]], np.uint16)
+    dn = np.roll(np.tile(blacks + np.uint16(1), (20, 24)), (top, left), axis=(0, 1))
+    dn[:top], dn[:, :left] = 0, 0
+    area, repeat = (50829, "I", 4, (top, left, top + 33, left + 35)), (50713, "H", 2, (2, 2))
+    crop = (50719, "H", 2, (2, 2)), (50720, "H", 2, (28, 26))
+    write_with_black(tmp_path / "a.dng", dn, area, repeat, (50714, "I", 4, (60, 64, 68, 76)), *crop)
+    back = read_raw(tmp_path / "a.dng")
+    assert (back.cfa, back.mosaic.shape) == ("GBRG", (32, 34))
+    np.testing.assert_allclose(back.mosaic, 1 / (1023 - 67), rtol=1e-4)
+    write_dng(tmp_path / "b.dng", back)
+    with tifffile.TiffFile(tmp_path / "b.dng") as file:
+        assert tuple(file.pages.first.tags[50719].value) == (2, 2)
+
+
 def test_fractions_of_a_black_level_are_kept(tmp_path):
     """Phones state the mean of their dark pixels as a rational; a quarter of a DN tints shadows."""
     levels = (50714, "2I", 4, (259, 4, 129, 2, 257, 4, 649, 10))

@@ -170,14 +170,14 @@ def _read_source(path: Path) -> _Source:
 
 def _from_libraw(file: rawpy.RawPy, source: _Source, path: Path) -> Raw:
     tags = source.values
-    cfa = _cfa(file, path)
-    dn = file.raw_image_visible
+    dn, colours = _visible(file, _pattern(file, path), tags)
+    cfa = _cfa(file, colours, path)
     dn = dn[: dn.shape[0] - dn.shape[0] % 2, : dn.shape[1] - dn.shape[1] % 2]
     if dn.size == 0:
         raise FsidError(f"{path}: is smaller than one 2x2 tile of its filter pattern")
     blacks = dng_tags.black_tile(tags)
     if blacks is None:
-        blacks = np.asarray(file.black_level_per_channel, np.float64)[file.raw_colors_visible[:2, :2]]
+        blacks = np.asarray(file.black_level_per_channel, np.float64)[colours]
     black, white = round(float(blacks.mean())), int(file.white_level)
     if not 0 <= black < white:
         raise FsidError(f"{path}: black level {black} is not below white level {white}")
@@ -200,13 +200,35 @@ def _from_libraw(file: rawpy.RawPy, source: _Source, path: Path) -> Raw:
     )
 
 
-def _cfa(file: rawpy.RawPy, path: Path) -> str:
+def _visible(
+    file: rawpy.RawPy, pattern: np.ndarray, tags: dict[int, Values]
+) -> tuple[np.ndarray, np.ndarray]:
+    """The image without its masked margins, and LibRaw's colours of its first 2x2 pixels.
+
+    LibRaw starts at even pixels; what a DNG says of pixels counts from where its ActiveArea starts.
+    """
+    area = dng_tags.active_area(tags)
+    if area is not None:
+        top, left, bottom, right = area
+        height, width = file.raw_image.shape
+        moved = max(abs(file.sizes.top_margin - top), abs(file.sizes.left_margin - left))
+        if moved <= 1 and bottom <= height and right <= width:
+            return file.raw_image[top:bottom, left:right], np.roll(pattern, (-top, -left), axis=(0, 1))
+    return file.raw_image_visible, file.raw_colors_visible[:2, :2]
+
+
+def _pattern(file: rawpy.RawPy, path: Path) -> np.ndarray:
+    """(2, 2) LibRaw's colours of the pixels from the first one on, masked ones included."""
     if file.raw_type != rawpy.RawType.Flat or file.num_colors != 3 or file.raw_pattern is None:
         raise FsidError(f"{path}: has no Bayer mosaic (linear, Foveon or monochrome); FSID needs a Bayer RAW")
     if file.raw_pattern.shape != (2, 2):
         raise FsidError(f"{path}: is an X-Trans RAW; FSID needs a Bayer RAW")
+    return file.raw_pattern
+
+
+def _cfa(file: rawpy.RawPy, colours: np.ndarray, path: Path) -> str:
     names = file.color_desc.decode("ascii")
-    cfa = "".join(names[i] for i in file.raw_colors_visible[:2, :2].ravel())
+    cfa = "".join(names[i] for i in colours.ravel())
     if cfa not in CFA_PATTERNS:
         raise FsidError(f"{path}: its filter pattern {cfa} is not Bayer; FSID needs a Bayer RAW")
     return cfa

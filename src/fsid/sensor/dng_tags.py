@@ -40,10 +40,11 @@ EXIF_ISO = 34855
 DNG_VERSION, DNG_BACKWARD_VERSION, UNIQUE_CAMERA_MODEL = 50706, 50707, 50708
 CFA_PLANE_COLOUR, CFA_LAYOUT, BLACK_REPEAT, BLACK_LEVEL, WHITE_LEVEL = 50710, 50711, 50713, 50714, 50717
 COLOUR_MATRIX_1, COLOUR_MATRIX_2, AS_SHOT_NEUTRAL, PRIVATE_DATA = 50721, 50722, 50728, 50740
-ILLUMINANT_1, ILLUMINANT_2, NOISE_PROFILE = 50778, 50779, 51041
+ILLUMINANT_1, ILLUMINANT_2, NOISE_PROFILE, ACTIVE_AREA = 50778, 50779, 51041, 50829
 
 D65 = 21  # EXIF LightSource
 MAX_EXIF_ISO = 65535
+MAX_SIDE = 65535  # pixels that LibRaw opens
 MAX_REPEAT = 16  # rows and columns of a pattern of black levels; LibRaw rounds them and keeps 2 x 2
 
 _OWNER = b"FSID\0"
@@ -142,9 +143,18 @@ def date_taken(tags: Tags) -> str:
     return day if re.fullmatch(r"\d{4}-\d\d-\d\d", day) else ""
 
 
+def active_area(tags: Tags) -> tuple[int, int, int, int] | None:
+    """(top, left, bottom, right) of a DNG's pixels that saw light; None where `tags` state no such area."""
+    area = _numbers(tags, ACTIVE_AREA)
+    if DNG_VERSION not in tags or len(area) != 4 or not all(0 <= edge <= MAX_SIDE for edge in area):
+        return None
+    top, left, bottom, right = map(int, area)
+    return (top, left, bottom, right) if top < bottom and left < right else None
+
+
 def black_tile(tags: Tags) -> np.ndarray | None:
-    """(rows, columns) black levels in DN that repeat from the image's first pixel on; None where `tags` are
-    not a DNG's, or state none that fit their pattern."""
+    """(rows, columns) black levels in DN that repeat from the first pixel of the active area on; None where
+    `tags` are not a DNG's, or state none that fit their pattern."""
     values = list(_numbers(tags, BLACK_LEVEL))
     repeat = _numbers(tags, BLACK_REPEAT) or (1, 1)
     if DNG_VERSION not in tags or len(repeat) != 2 or not all(1 <= n <= MAX_REPEAT for n in repeat):
