@@ -193,6 +193,23 @@ def test_black_levels_and_crop_count_from_the_active_area(tmp_path, top, left):
         assert tuple(file.pages.first.tags[50719].value) == (2, 2)
 
 
+def test_black_levels_of_rows_and_columns_are_subtracted(tmp_path):
+    """BlackLevelDeltaV and H, from the first pixel of an odd active area on, and 5 DN of light everywhere."""
+    rows, columns = np.arange(33) % 7 - 3.5, np.arange(41) % 5 - 1.0
+    dn = np.zeros((36, 48), np.uint16)
+    dn[3:, 5:46] = 64.5 + 5 + rows[:, None] + columns
+    deltas = [
+        (code, "2i", len(d), tuple(int(n) for delta in d for n in (2 * delta, 2)))
+        for code, d in ((50716, rows), (50715, columns))
+    ]
+    area, level = (50829, "I", 4, (3, 5, 36, 46)), (50714, "2I", 1, (129, 2))
+    write_with_black(tmp_path / "a.dng", dn, area, level, *deltas)
+    raw = read_raw(tmp_path / "a.dng")
+    np.testing.assert_allclose(raw.mosaic, 5 / (1023 - raw.black_level), atol=1e-6)
+    write_dng(tmp_path / "b.dng", clean_levels(raw))
+    np.testing.assert_allclose(read_raw(tmp_path / "b.dng").mosaic, raw.mosaic, atol=1e-5)
+
+
 def test_fractions_of_a_black_level_are_kept(tmp_path):
     """Phones state the mean of their dark pixels as a rational; a quarter of a DN tints shadows."""
     levels = (50714, "2I", 4, (259, 4, 129, 2, 257, 4, 649, 10))

@@ -8,6 +8,7 @@ a tar shard. The same image gives the same bytes: no clock, no software version.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -20,11 +21,12 @@ import rawpy
 from fsid.errors import FsidError
 from fsid.files import write_atomically
 from fsid.sensor import dng_tags
+from fsid.sensor.black_levels import BlackLevels
 from fsid.sensor.colour import published_matrices
 from fsid.sensor.embedded import embedded_directories
 from fsid.sensor.metadata import Metadata, kept_metadata, libraw_metadata, taken
 from fsid.sensor.mosaic import CFA_PATTERNS
-from fsid.sensor.quantise import from_dn, to_dn
+from fsid.sensor.quantise import to_dn
 from fsid.sensor.raw import Raw
 from fsid.sensor.tiff import (
     CFA,
@@ -97,9 +99,9 @@ def read_header(path: str | Path) -> RawHeader:
 def read_raw(path: str | Path) -> Raw:
     """Any Bayer RAW file as `Raw`: visible area, even size, levels, CFA of its first pixel, colour, noise.
 
-    Black levels that differ between sites (in a DNG in any pattern, and by fractions of a DN) are subtracted
-    each; `black_level` is their rounded mean. Unknown colour becomes the mean of the published matrices,
-    unknown white balance (1, 1, 1), unknown ISO 0.
+    Black levels that differ between sites (in a DNG in any pattern, between rows and columns too, and by
+    fractions of a DN) are subtracted each; `black_level` is their rounded mean. Unknown colour becomes the
+    mean of the published matrices, unknown white balance (1, 1, 1), unknown ISO 0.
     FsidError: missing, truncated, no RAW, not Bayer (X-Trans, Foveon, linear DNG, monochrome).
     """
     path = Path(path)
@@ -172,22 +174,17 @@ def _from_libraw(file: rawpy.RawPy, source: _Source, path: Path) -> Raw:
     tags = source.values
     dn, colours = _visible(file, _pattern(file, path), tags)
     cfa = _cfa(file, colours, path)
+    levels = _black_levels(file, colours, tags, dn.shape)
     dn = dn[: dn.shape[0] - dn.shape[0] % 2, : dn.shape[1] - dn.shape[1] % 2]
     if dn.size == 0:
         raise FsidError(f"{path}: is smaller than one 2x2 tile of its filter pattern")
-    blacks = dng_tags.black_tile(tags)
-    if blacks is None:
-        blacks = np.asarray(file.black_level_per_channel, np.float64)[colours]
-    black, white = round(float(blacks.mean())), int(file.white_level)
-    if not 0 <= black < white:
-        raise FsidError(f"{path}: black level {black} is not below white level {white}")
-    mosaic = from_dn(dn, black, white)
-    rows, columns = blacks.shape
-    for (r, c), level in np.ndenumerate(blacks):
-        mosaic[r::rows, c::columns] -= np.float32((level - black) / (white - black))
+    level, white = levels.mean(), int(file.white_level)
+    if not (math.isfinite(level) and 0 <= round(level) < white):
+        raise FsidError(f"{path}: black level {level:g} is not below white level {white}")
+    black = round(level)
     metadata = source.metadata or libraw_metadata(file)
     return Raw(
-        mosaic=mosaic,
+        mosaic=levels.normalised(dn, black, white),
         cfa=cfa,
         black_level=black,
         white_level=white,
@@ -215,6 +212,18 @@ def _visible(
         if moved <= 1 and bottom <= height and right <= width:
             return file.raw_image[top:bottom, left:right], np.roll(pattern, (-top, -left), axis=(0, 1))
     return file.raw_image_visible, file.raw_colors_visible[:2, :2]
+
+
+def _black_levels(
+    file: rawpy.RawPy, colours: np.ndarray, tags: dict[int, Values], shape: tuple[int, int]
+) -> BlackLevels:
+    """What a DNG's tags say, else what LibRaw says of each colour; shape: of the active area."""
+    tile = dng_tags.black_tile(tags)
+    if tile is None:
+        levels = np.asarray(file.black_level_per_channel, np.float64)
+        return BlackLevels(levels[colours], np.zeros(shape[0]), np.zeros(shape[1]))
+    of_row = dng_tags.black_deltas(tags, dng_tags.BLACK_DELTA_V, shape[0])
+    return BlackLevels(tile, of_row, dng_tags.black_deltas(tags, dng_tags.BLACK_DELTA_H, shape[1]))
 
 
 def _pattern(file: rawpy.RawPy, path: Path) -> np.ndarray:

@@ -40,6 +40,7 @@ EXIF_ISO = 34855
 DNG_VERSION, DNG_BACKWARD_VERSION, UNIQUE_CAMERA_MODEL = 50706, 50707, 50708
 CFA_PLANE_COLOUR, CFA_LAYOUT, BLACK_REPEAT, BLACK_LEVEL, WHITE_LEVEL = 50710, 50711, 50713, 50714, 50717
 COLOUR_MATRIX_1, COLOUR_MATRIX_2, AS_SHOT_NEUTRAL, PRIVATE_DATA = 50721, 50722, 50728, 50740
+BLACK_DELTA_H, BLACK_DELTA_V = 50715, 50716
 ILLUMINANT_1, ILLUMINANT_2, NOISE_PROFILE, ACTIVE_AREA = 50778, 50779, 51041, 50829
 
 D65 = 21  # EXIF LightSource
@@ -163,6 +164,13 @@ def black_tile(tags: Tags) -> np.ndarray | None:
     if len(values) == 2 * rows * columns:
         values = quotients(values)
     return np.array(values, np.float64).reshape(rows, columns) if len(values) == rows * columns else None
+
+
+def black_deltas(tags: Tags, code: int, length: int) -> np.ndarray:
+    """(length,) DN that each row (code BLACK_DELTA_V) or column (BLACK_DELTA_H) of the active area adds to
+    the black level; 0 where `tags` state another number of them."""
+    deltas = quotients(_numbers(tags, code))
+    return np.array(deltas) if len(deltas) == length else np.zeros(length)
 
 
 def d65_matrix(tags: Tags) -> np.ndarray | None:
