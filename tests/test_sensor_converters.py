@@ -61,7 +61,7 @@ MATRIX_A = [0.9, -0.3, -0.1, -0.4, 1.2, 0.2, -0.1, 0.2, 0.5]
 MATRIX_D65 = [0.8, -0.2, -0.1, -0.5, 1.3, 0.2, -0.1, 0.2, 0.6]
 
 
-def foreign_dng() -> bytes:
+def foreign_dng(illuminants: tuple[int, int] = (17, 21)) -> bytes:
     """A DNG as a camera writes it: two illuminants, crop, lens and exposure, sideways."""
     dn = np.random.default_rng(0).integers(64, 1024, (48, 64)).astype(np.uint16)
     ascii_tags = {
@@ -87,8 +87,8 @@ def foreign_dng() -> bytes:
         Tag(50728, RATIONAL, rationals([0.5, 1.0, 0.6])),
         Tag(50730, SRATIONAL, rationals([0.35])),
         Tag(50736, RATIONAL, rationals([24.0, 70.0, 2.8, 4.0])),
-        Tag(50778, SHORT, (17,)),
-        Tag(50779, SHORT, (21,)),
+        Tag(50778, SHORT, illuminants[:1]),
+        Tag(50779, SHORT, illuminants[1:]),
     )
     exif = (
         Tag(33434, RATIONAL, (1, 50)),
@@ -124,6 +124,15 @@ def test_the_header_of_a_foreign_file_is_read(foreign):
     assert (header.camera, header.iso, header.exposure_s) == ("Maker One", 1600.0, 0.02)
     assert header.date == "2026-11-21"
     np.testing.assert_allclose(read_raw(foreign).xyz_to_camera.ravel(), MATRIX_D65, rtol=1e-9)
+
+
+@pytest.mark.parametrize("illuminants", [(17, 23), (17, 20), (17, 22), (3, 10), (14, 255), (20, 21)])
+def test_the_matrix_of_the_light_nearest_to_d65_is_read(tmp_path, illuminants):
+    """Standard light A and D50, D55 or D75, a lamp and clouds, a lamp and an unknown light, D55 and D65."""
+    for pair, matrix in ((illuminants, MATRIX_D65), (illuminants[::-1], MATRIX_A)):
+        (tmp_path / "a.dng").write_bytes(foreign_dng(pair))
+        back = read_raw(written(tmp_path / "b.dng", read_raw(tmp_path / "a.dng")))
+        np.testing.assert_allclose(back.xyz_to_camera.ravel(), matrix, rtol=1e-9)
 
 
 def test_what_was_replaced_is_not_contradicted_by_what_was_kept(foreign, tmp_path):

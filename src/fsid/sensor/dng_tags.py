@@ -44,6 +44,10 @@ BLACK_DELTA_H, BLACK_DELTA_V = 50715, 50716
 ILLUMINANT_1, ILLUMINANT_2, NOISE_PROFILE, ACTIVE_AREA = 50778, 50779, 51041, 50829
 
 D65 = 21  # EXIF LightSource
+_KELVIN: dict[float, int] = {1: 5500, 2: 4150, 3: 2850, 4: 5500, 9: 5500, 10: 6500, 11: 7500}
+_KELVIN |= {12: 6400, 13: 5050, 14: 4150, 15: 3450, 16: 2950, 17: 2850, 18: 5500, 19: 6500}
+_KELVIN |= {20: 5500, D65: 6500, 22: 7500, 23: 5000, 24: 3200}  # of each LightSource; of a range, its middle
+_UNKNOWN_KELVIN = 5000  # between lamps and daylight
 MAX_EXIF_ISO = 65535
 MAX_SIDE = 65535  # pixels that LibRaw opens
 MAX_REPEAT = 16  # rows and columns of a pattern of black levels; LibRaw rounds them and keeps 2 x 2
@@ -174,13 +178,18 @@ def black_deltas(tags: Tags, code: int, length: int) -> np.ndarray:
 
 
 def d65_matrix(tags: Tags) -> np.ndarray | None:
-    """(3, 3) XYZ -> camera matrix for D65, else for the other illuminant that `tags` offer, else None."""
+    """(3, 3) XYZ -> camera matrix of the illuminant nearest to D65 that `tags` offer one for, else None."""
     first = (_number(tags, ILLUMINANT_1, D65), _numbers(tags, COLOUR_MATRIX_1))
     second = (_number(tags, ILLUMINANT_2, 0), _numbers(tags, COLOUR_MATRIX_2))
-    for _, numbers in sorted((first, second), key=lambda pair: pair[0] != D65):
+    for _, numbers in sorted((first, second), key=lambda pair: _mired_from_d65(pair[0])):
         if len(matrix := quotients(numbers)) == 9:
             return np.reshape(matrix, (3, 3))
     return None
+
+
+def _mired_from_d65(illuminant: float) -> float:
+    """How far the colour temperature of an EXIF LightSource lies from that of D65."""
+    return abs(1e6 / _KELVIN.get(illuminant, _UNKNOWN_KELVIN) - 1e6 / _KELVIN[D65])
 
 
 def camera_name(tags: Tags) -> str:
