@@ -26,7 +26,7 @@ from fsid.sensor import (
 )
 from fsid.sensor.colour import published_matrices
 from fsid.sensor.dng_tags import noise_profile
-from fsid.sensor.tiff import ASCII, BYTE, SHORT, Directory, Tag, image_tags, tiff_bytes
+from fsid.sensor.tiff import ASCII, BYTE, CFA, LONG, SHORT, Directory, Tag, image_tags, tiff_bytes
 
 HEIGHT, WIDTH = 34, 50
 PREVIEW = np.random.default_rng(0).integers(0, 256, (17, 25, 3)).astype(np.uint8)
@@ -289,6 +289,57 @@ def test_a_truncated_file_is_named(tmp_path):
         (tmp_path / "short.dng").write_bytes(data[:kept])
         with pytest.raises(FsidError, match=r"short\.dng"):
             read_raw(tmp_path / "short.dng")
+
+
+def write_tiles(path, *tiles):
+    """A DNG 32 high whose tiles, 64 wide, hold those bytes."""
+    places = np.cumsum([0, *map(len, tiles)])[:-1]
+    tags = [
+        (256, LONG, (64 * len(tiles),)),
+        (257, LONG, (32,)),
+        (258, SHORT, (16,)),
+        (259, SHORT, (7,)),
+        (262, SHORT, (CFA,)),
+        (277, SHORT, (1,)),
+        (322, LONG, (64,)),
+        (323, LONG, (32,)),
+        (325, LONG, tuple(map(len, tiles))),
+        (33421, SHORT, (2, 2)),
+        (33422, BYTE, bytes((0, 1, 1, 2))),
+        (50706, BYTE, bytes((1, 4, 0, 0))),
+        (50708, ASCII, b"Some camera\0"),
+    ]
+    for start in (0, len(tiff_bytes(Directory(tuple(Tag(*tag) for tag in (*tags, (324, LONG, (0, 0)))))))):
+        offsets = (324, LONG, tuple(int(place) + start for place in places))
+        data = tiff_bytes(Directory(tuple(Tag(*tag) for tag in (*tags, offsets))))
+    path.write_bytes(data + b"".join(tiles))
+
+
+GREY_JPEG = b"".join(
+    (
+        b"\xff\xd8",
+        b"\xff\xc4\x00\x14\x00" + bytes((1, *15 * (0,), 0)),  # one code, 0: no difference to the last pixel
+        b"\xff\xc3\x00\x0b\x10" + bytes((0, 32, 0, 64, 1, 0, 17, 0)),  # 16 bits, 32 x 64, one component
+        b"\xff\xda\x00\x08\x01" + bytes((0, 0, 1, 0, 0)),
+        bytes(32 * 64 // 8),
+        b"\xff\xd9",
+    )
+)
+
+
+@pytest.mark.parametrize("last", [GREY_JPEG, GREY_JPEG + b"\0", GREY_JPEG + bytes(5000), GREY_JPEG[:-1]])
+def test_a_compressed_file_is_read_whatever_follows_its_end(tmp_path, last):
+    write_tiles(tmp_path / "a.dng", GREY_JPEG, last)
+    raw = read_raw(tmp_path / "a.dng")
+    assert raw.mosaic.shape == (32, 128)
+    np.testing.assert_allclose(raw.mosaic, 32768 / 65535)
+
+
+@pytest.mark.parametrize("kept", [0, 1, 60])
+def test_zeros_for_compressed_pixels_are_a_broken_copy(tmp_path, kept):
+    write_tiles(tmp_path / "a.dng", GREY_JPEG, GREY_JPEG[:kept] + bytes(5000 - kept))
+    with pytest.raises(FsidError, match=r"a\.dng: corrupt.*copy it again"):
+        read_raw(tmp_path / "a.dng")
 
 
 @settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -24,6 +24,7 @@ from fsid.sensor import dng_tags
 from fsid.sensor.black_levels import BlackLevels
 from fsid.sensor.colour import published_matrices
 from fsid.sensor.embedded import embedded_directories
+from fsid.sensor.intact import check_intact
 from fsid.sensor.metadata import Metadata, kept_metadata, libraw_metadata, taken
 from fsid.sensor.mosaic import CFA_PATTERNS
 from fsid.sensor.quantise import to_dn
@@ -34,10 +35,7 @@ from fsid.sensor.tiff import (
     PHOTOMETRIC,
     RGB,
     STRIP_OFFSETS,
-    STRIP_SIZES,
     SUB_IFD,
-    TILE_OFFSETS,
-    TILE_SIZES,
     Directory,
     Tag,
     Values,
@@ -102,7 +100,8 @@ def read_raw(path: str | Path) -> Raw:
     Black levels that differ between sites (in a DNG in any pattern, between rows and columns too, and by
     fractions of a DN) are subtracted each; `black_level` is their rounded mean. Unknown colour becomes the
     mean of the published matrices, unknown white balance (1, 1, 1), unknown ISO 0.
-    FsidError: missing, truncated, no RAW, not Bayer (X-Trans, Foveon, linear DNG, monochrome).
+    FsidError: missing, truncated, zeros in place of pixels, no RAW, not Bayer (X-Trans, Foveon, linear DNG,
+    monochrome).
     """
     path = Path(path)
     with _opened(path) as (file, source):
@@ -158,12 +157,8 @@ def _mosaic_directory(directories: list[dict[int, Tag]]) -> dict[int, Tag]:
 def _read_source(path: Path) -> _Source:
     with path.open("rb") as file:
         directories = read_directories(file) or embedded_directories(file)
-    mosaic = _mosaic_directory(directories)
-    size = path.stat().st_size
-    for offsets, sizes in ((STRIP_OFFSETS, STRIP_SIZES), (TILE_OFFSETS, TILE_SIZES)):
-        places, lengths = (mosaic[code].values if code in mosaic else () for code in (offsets, sizes))
-        if max((o + n for o, n in zip(places, lengths, strict=False)), default=0) > size:
-            raise FsidError(f"{path}: truncated, its pixels go on after byte {size}; copy it again")
+        mosaic = _mosaic_directory(directories)
+        check_intact(file, mosaic, path)
     values: dict[int, Values] = {}
     for directory in (*directories, mosaic):
         values |= {code: tag.values for code, tag in directory.items()}

@@ -19,7 +19,8 @@ import numpy as np
 
 BYTE, ASCII, SHORT, LONG, RATIONAL, SRATIONAL, DOUBLE = 1, 2, 3, 4, 5, 10, 12
 SUB_IFD, EXIF_IFD = 330, 34665
-PHOTOMETRIC, STRIP_OFFSETS, STRIP_SIZES, TILE_OFFSETS, TILE_SIZES = 262, 273, 279, 324, 325
+COMPRESSION, PHOTOMETRIC = 259, 262
+STRIP_OFFSETS, STRIP_SIZES, TILE_OFFSETS, TILE_SIZES = 273, 279, 324, 325
 RGB, CFA = 2, 32803  # photometric interpretations
 
 Values = tuple[float, ...] | bytes  # numbers (numerator, denominator, ... of rationals), or bytes and text
@@ -70,7 +71,7 @@ def image_tags(pixels: np.ndarray, photometric: int, subfile_type: int) -> tuple
         Tag(256, LONG, (pixels.shape[1],)),
         Tag(257, LONG, (pixels.shape[0],)),
         Tag(258, SHORT, (8 * pixels.itemsize,) * samples),
-        Tag(259, SHORT, (1,)),  # no compression
+        Tag(COMPRESSION, SHORT, (1,)),  # none
         Tag(PHOTOMETRIC, SHORT, (photometric,)),
         Tag(277, SHORT, (samples,)),
         Tag(278, LONG, (pixels.shape[0],)),

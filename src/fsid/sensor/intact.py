@@ -1,0 +1,53 @@
+"""Whether the pixels of a TIFF are all there: LibRaw makes black of what is not, and calls it an image.
+
+A copy that broke off leaves a file short, or zeros in the place of pixels. Zeros tell nothing in uncompressed
+pixels. A lossless JPEG begins with the marker SOI, and ends with EOI, after which writers may pad with zeros;
+some cut EOI off (Leica M10), so that only zeros without it are a broken copy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import BinaryIO
+
+from fsid.errors import FsidError
+from fsid.sensor.tiff import COMPRESSION, STRIP_OFFSETS, STRIP_SIZES, TILE_OFFSETS, TILE_SIZES, Tag
+
+LOSSLESS_JPEG = 7  # compression of TIFF
+_SOI, _EOI = b"\xff\xd8", b"\xff\xd9"
+_SECTOR_BYTES = 512  # the least that a broken copy lacks
+_LONGEST_PADDING = 1 << 16
+
+
+def check_intact(file: BinaryIO, directory: Mapping[int, Tag], path: Path) -> None:
+    """FsidError where strips or tiles of `directory` lie outside the file, or hold zeros, not a JPEG."""
+    size = file.seek(0, 2)
+    for offsets, sizes in ((STRIP_OFFSETS, STRIP_SIZES), (TILE_OFFSETS, TILE_SIZES)):
+        places, lengths = (directory[code].values if code in directory else () for code in (offsets, sizes))
+        parts = list(zip(places, lengths, strict=False))
+        if not all(0 <= place <= place + length <= size for place, length in parts):
+            raise FsidError(f"{path}: truncated, its pixels go on after byte {size}; copy it again")
+        if COMPRESSION in directory and directory[COMPRESSION].values == (LOSSLESS_JPEG,):
+            for place, length in parts:
+                if not _is_jpeg(file, int(place), int(length)):
+                    raise FsidError(
+                        f"{path}: corrupt, its pixels at byte {place:.0f} are missing or zeros; copy it again"
+                    )
+
+
+def _is_jpeg(file: BinaryIO, place: int, length: int) -> bool:
+    """Whether a JPEG begins there, and does not turn to zeros before it ends."""
+    return _read(file, place, min(length, 2)) == _SOI and (
+        any(_end(file, place, length, _SECTOR_BYTES))
+        or _end(file, place, length, _LONGEST_PADDING).rstrip(b"\0").endswith(_EOI)
+    )
+
+
+def _end(file: BinaryIO, place: int, length: int, most: int) -> bytes:
+    return _read(file, place + max(length - most, 0), min(length, most))
+
+
+def _read(file: BinaryIO, place: int, length: int) -> bytes:
+    file.seek(place)
+    return file.read(length)
