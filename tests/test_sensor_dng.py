@@ -261,6 +261,13 @@ def test_a_raw_that_is_not_bayer_is_named(tmp_path, kind, words):
     assert "\n" not in str(caught.value)
 
 
+def test_floating_point_pixels_are_refused(tmp_path):
+    """LibRaw scales the largest value, or white if that is more, to 16383, and tells neither."""
+    write_with_black(tmp_path / "a.dng", np.full((32, 40), 70, np.float32), (50714, "H", 1, 64))
+    with pytest.raises(FsidError, match=r"a\.dng: holds floating-point pixels"):
+        read_raw(tmp_path / "a.dng")
+
+
 @pytest.mark.parametrize("data", [b"", b"II*\0", b"hello, this is text\n" * 100, bytes(5000)])
 def test_what_is_not_raw_is_named(tmp_path, data):
     (tmp_path / "note.dng").write_bytes(data)

@@ -34,6 +34,7 @@ from fsid.sensor.tiff import (
     EXIF_IFD,
     PHOTOMETRIC,
     RGB,
+    SAMPLE_FORMAT,
     STRIP_OFFSETS,
     SUB_IFD,
     Directory,
@@ -45,6 +46,7 @@ from fsid.sensor.tiff import (
 )
 
 _FULL_IMAGE, _REDUCED_IMAGE = 0, 1  # TIFF NewSubfileType
+_FLOATING_POINT = 3  # TIFF SampleFormat
 
 
 def write_dng(target: str | Path | BinaryIO, raw: Raw, preview: np.ndarray | None = None) -> None:
@@ -101,7 +103,7 @@ def read_raw(path: str | Path) -> Raw:
     fractions of a DN) are subtracted each; `black_level` is their rounded mean. Unknown colour becomes the
     mean of the published matrices, unknown white balance (1, 1, 1), unknown ISO 0.
     FsidError: missing, truncated, zeros in place of pixels, no RAW, not Bayer (X-Trans, Foveon, linear DNG,
-    monochrome).
+    monochrome), floating point.
     """
     path = Path(path)
     with _opened(path) as (file, source):
@@ -159,6 +161,11 @@ def _read_source(path: Path) -> _Source:
         directories = read_directories(file) or embedded_directories(file)
         mosaic = _mosaic_directory(directories)
         check_intact(file, mosaic, path)
+    if SAMPLE_FORMAT in mosaic and mosaic[SAMPLE_FORMAT].values == (_FLOATING_POINT,):
+        raise FsidError(
+            f"{path}: holds floating-point pixels, which LibRaw scales by a factor that it does not tell; "
+            f"FSID needs the integers of a camera"
+        )
     values: dict[int, Values] = {}
     for directory in (*directories, mosaic):
         values |= {code: tag.values for code, tag in directory.items()}
