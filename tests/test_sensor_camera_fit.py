@@ -1,6 +1,7 @@
 """Frames on disk become the profile of the camera that took them."""
 
 import shutil
+import struct
 from dataclasses import replace
 from pathlib import Path
 
@@ -50,6 +51,17 @@ def write_arrays(folder: Path, images: list[np.ndarray]) -> list[Path]:
     for path, image in zip(paths, images, strict=True):
         np.save(path, image)
     return paths
+
+
+def write_with_black(path: Path, dn: np.ndarray, black: tuple[int, int]) -> Path:
+    """Those integers as a DNG that states that rational for its black level."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_dng(path, replace(scene(), mosaic=((dn - 64) / (1023 - 64)).astype(np.float32), iso=100))
+    data, whole = path.read_bytes(), struct.pack("<HHII", 50714, 4, 1, 64)
+    assert data.count(whole) == 1
+    rational = struct.pack("<HHII", 50714, 5, 1, len(data))
+    path.write_bytes(data.replace(whole, rational) + struct.pack("<II", *black))
+    return path
 
 
 def within(found, expected, error, sigmas=4.5):
@@ -221,6 +233,21 @@ def test_read_noise_that_reaches_zero_is_said_and_still_found(tmp_path, rng):
     assert any("reaches DN 0" in note for note in found.notes)
     np.testing.assert_allclose(found.profile.sigma2[0], PROFILE.level(12800).sigma2, rtol=0.04)
     np.testing.assert_allclose(found.profile.measured.black, 64, atol=2)
+
+
+@pytest.mark.parametrize("blacks", [((129, 2), (129, 2)), ((322, 5), (323, 5))])
+def test_a_black_level_between_two_integers_rounds_nothing_twice(tmp_path, rng, blacks):
+    """Noise of 0.1 DN x signal + 0.8 DN^2 above 64.5 DN; a file may state 64.4 and the next one 64.6."""
+    bursts: list[list[Path]] = [[], []]
+    for paths, light_dn in zip(bursts, (600 * scene().mosaic, 0 * scene().mosaic), strict=True):
+        for number in range(FRAMES):
+            noise = np.sqrt(0.1 * light_dn + 0.8 - 1 / 12) * rng.standard_normal(light_dn.shape)
+            path = tmp_path / f"{light_dn.max():.0f}" / f"{number}.dng"
+            paths.append(write_with_black(path, np.rint(64.5 + light_dn + noise), blacks[number % 2]))
+    fit = calibrate(bursts[0], name="x", dark=bursts[1]).fits[0]
+    np.testing.assert_allclose(fit.black, 64.5, atol=0.02)
+    np.testing.assert_allclose(fit.sigma2_dn, 0.8, rtol=0.03)
+    within(fit.sigma2_dn, 0.8, fit.sigma2_dn_error)
 
 
 def _fails(match, *arguments, **options):

@@ -25,6 +25,7 @@ from fsid.sensor import (
     write_dng,
 )
 from fsid.sensor.colour import published_matrices
+from fsid.sensor.dng import read_stored
 from fsid.sensor.dng_tags import noise_profile
 from fsid.sensor.tiff import ASCII, BYTE, CFA, LONG, SHORT, Directory, Tag, image_tags, tiff_bytes
 
@@ -218,6 +219,20 @@ def test_fractions_of_a_black_level_are_kept(tmp_path):
     dn = back.black_level + back.mosaic[:2, :2] * (1023 - back.black_level)
     expected = 70 + back.black_level - np.array([[64.75, 64.5], [64.25, 64.9]])
     np.testing.assert_allclose(dn, expected, atol=1e-3)
+
+
+def test_stored_integers_are_moved_by_whole_dn_and_never_fall_together(tmp_path):
+    """Blacks of 60, 64.5, 68 and 75.5 DN about their mean, 67; what is at 0 or white stays there."""
+    levels = (50714, "2I", 4, (60, 1, 129, 2, 68, 1, 151, 2))
+    dn = np.concatenate([np.arange(40 * 30).reshape(30, 40), np.full((2, 40), 1023)]).clip(0, 1023)
+    write_with_black(tmp_path / "a.dng", dn.astype(np.uint16), (50713, "H", 2, (2, 2)), levels)
+    stored = read_stored(tmp_path / "a.dng")
+    np.testing.assert_array_equal(stored.dn, dn)
+    assert (stored.cfa, stored.black_level, stored.white_level) == ("GBRG", 67, 1023)
+    moved = stored.black.levelled(stored.dn, 67, 1023).astype(int)
+    expected = dn - np.tile([[-7, -2], [1, 8]], (16, 20))
+    inside = (dn > 0) & (dn < 1023)
+    np.testing.assert_array_equal(moved, np.where(inside, expected.clip(0, 1023), dn))
 
 
 def test_a_crop_ends_with_the_image(tmp_path):

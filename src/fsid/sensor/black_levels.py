@@ -37,3 +37,16 @@ class BlackLevels:
         x -= (self.of_row[: len(x), None] * unit).astype(np.float32)
         x -= (self.of_column[: x.shape[1]] * unit).astype(np.float32)
         return x
+
+    def levelled(self, dn: np.ndarray, black: int, white: int) -> np.ndarray:
+        """(H, W) uint16: the stored integers, each moved by as many whole DN as its level is off `black`.
+
+        Fractions of a DN stay: rounded once more, integers would fall together. 0 and white stay too.
+        """
+        rows, columns = (np.arange(side) % n for side, n in zip(dn.shape, self.tile.shape, strict=True))
+        above = (self.tile - black).astype(np.float32)[np.ix_(rows, columns)]
+        above += self.of_row[: len(rows), None]
+        above += self.of_column[: len(columns)]
+        np.rint(above, out=above)
+        moved = np.where((dn > 0) & (dn < white), dn - above, dn)
+        return np.clip(moved, 0, white).astype(np.uint16)

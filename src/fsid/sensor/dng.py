@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO
 
@@ -110,6 +110,28 @@ def read_raw(path: str | Path) -> Raw:
         return _from_libraw(file, source, path)
 
 
+@dataclass(frozen=True, eq=False)
+class Stored:
+    """What a RAW file holds. dn: (H, W) uint16, H and W even. cfa: of its first pixel. black: of each."""
+
+    dn: np.ndarray
+    cfa: str
+    black: BlackLevels
+    white_level: int
+
+    @property
+    def black_level(self) -> int:
+        return round(self.black.mean())
+
+
+def read_stored(path: str | Path) -> Stored:
+    """Any Bayer RAW file as it is stored. Errors as in `read_raw`."""
+    path = Path(path)
+    with _opened(path) as (file, source):
+        stored = _stored(file, source.values, path)
+        return replace(stored, dn=stored.dn.copy())  # LibRaw's memory goes with the file
+
+
 @contextmanager
 def _opened(path: Path) -> Iterator[tuple[rawpy.RawPy, _Source]]:
     """LibRaw's view of a file and its TIFF tags; whatever LibRaw or the disk refuses becomes one line."""
@@ -174,29 +196,34 @@ def _read_source(path: Path) -> _Source:
 
 def _from_libraw(file: rawpy.RawPy, source: _Source, path: Path) -> Raw:
     tags = source.values
-    dn, colours = _visible(file, _pattern(file, path), tags)
-    cfa = _cfa(file, colours, path)
-    levels = _black_levels(file, colours, tags, dn.shape)
-    dn = dn[: dn.shape[0] - dn.shape[0] % 2, : dn.shape[1] - dn.shape[1] % 2]
-    if dn.size == 0:
-        raise FsidError(f"{path}: is smaller than one 2x2 tile of its filter pattern")
-    level, white = levels.mean(), int(file.white_level)
-    if not (math.isfinite(level) and 0 <= round(level) < white):
-        raise FsidError(f"{path}: black level {level:g} is not below white level {white}")
-    black = round(level)
+    stored = _stored(file, tags, path)
     metadata = source.metadata or libraw_metadata(file)
     return Raw(
-        mosaic=levels.normalised(dn, black, white),
-        cfa=cfa,
-        black_level=black,
-        white_level=white,
+        mosaic=stored.black.normalised(stored.dn, stored.black_level, stored.white_level),
+        cfa=stored.cfa,
+        black_level=stored.black_level,
+        white_level=stored.white_level,
         white_balance=_white_balance(file),
         xyz_to_camera=_xyz_to_camera(file, tags),
         camera=dng_tags.camera_name(tags),
         iso=_iso(file, tags),
         noise=dng_tags.noise_level(tags),
-        metadata=metadata.within(dn.shape[1], dn.shape[0]),
+        metadata=metadata.within(stored.dn.shape[1], stored.dn.shape[0]),
     )
+
+
+def _stored(file: rawpy.RawPy, tags: dict[int, Values], path: Path) -> Stored:
+    """The pixels are in LibRaw's memory."""
+    dn, colours = _visible(file, _pattern(file, path), tags)
+    cfa = _cfa(file, colours, path)
+    black = _black_levels(file, colours, tags, dn.shape)
+    dn = dn[: dn.shape[0] - dn.shape[0] % 2, : dn.shape[1] - dn.shape[1] % 2]
+    if dn.size == 0:
+        raise FsidError(f"{path}: is smaller than one 2x2 tile of its filter pattern")
+    level, white = black.mean(), int(file.white_level)
+    if not (math.isfinite(level) and 0 <= round(level) < white):
+        raise FsidError(f"{path}: black level {level:g} is not below white level {white}")
+    return Stored(dn, cfa, black, white)
 
 
 def _visible(

@@ -18,24 +18,30 @@ import numpy as np
 
 from fsid.errors import FsidError
 from fsid.sensor.bare import BARE_SUFFIXES, Layout, check_white, read_dn
-from fsid.sensor.dng import RawHeader, read_header, read_raw
+from fsid.sensor.black_levels import BlackLevels
+from fsid.sensor.dng import RawHeader, read_header, read_stored
 from fsid.sensor.mosaic import check_cfa
-from fsid.sensor.quantise import check_levels, to_dn
+from fsid.sensor.quantise import check_levels
 
 SAME_LIGHT, SAME_DN = 0.03, 0.5  # difference of the levels of two frames of one burst, relative or in DN
+SAME_BLACK_DN = 1.0  # difference of the stated black levels of two frames of one mode: phones measure it anew
 _ISO_IN_PATH = re.compile(r"iso[-_ ]?(\d+)", re.IGNORECASE)
 _SITES_DIFFER = 0.02  # of the level: a flat grey through colour filters differs by far more
 
 
 @dataclass(frozen=True)
 class Camera:
-    """What all frames of a calibration share. cfa: None without filters. black_level: None where unknown."""
+    """What all frames of a calibration share. cfa: None without filters. black_level: None where unknown.
+
+    black: of every pixel of the first frame; None of bare mosaics.
+    """
 
     name: str
     cfa: str | None
     black_level: int | None
     white_level: int
     bare: bool
+    black: BlackLevels | None = None
 
 
 @dataclass(frozen=True)
@@ -59,18 +65,24 @@ class FrameSet:
     notes: tuple[str, ...]
 
     def read(self, frame: Frame, layout: Layout) -> np.ndarray:
-        """DN (H, W) of `frame`; FsidError where it is of another camera or another mode."""
-        if self.camera.bare:
-            return read_dn(frame.path, cfa=self.camera.cfa, width=layout.width, height=layout.height)
-        raw = read_raw(frame.path)
-        found = (raw.cfa, raw.black_level, raw.white_level)
-        expected = (self.camera.cfa, self.camera.black_level, self.camera.white_level)
-        if found != expected:
+        """DN (H, W) of `frame`; FsidError where it is of another camera or another mode.
+
+        They are the stored integers. Only where the black levels of pixels are whole DN apart, those of the
+        first frame are made alike. A black level that drifts from frame to frame is in the integers already.
+        """
+        camera = self.camera
+        if camera.black is None or camera.black_level is None:
+            return read_dn(frame.path, cfa=camera.cfa, width=layout.width, height=layout.height)
+        stored = read_stored(frame.path)
+        drift_dn = abs(stored.black.mean() - camera.black.mean())
+        if (stored.cfa, stored.white_level) != (camera.cfa, camera.white_level) or drift_dn > SAME_BLACK_DN:
+            found = (stored.cfa, stored.black_level, stored.white_level)
+            expected = (camera.cfa, camera.black_level, camera.white_level)
             raise FsidError(
                 f"{frame.path}: CFA, black and white level are {found}, those of the first frame {expected}; "
                 f"give frames of one camera in one mode"
             )
-        return to_dn(raw)
+        return camera.black.levelled(stored.dn, camera.black_level, camera.white_level)
 
 
 def find_frames(
@@ -136,15 +148,16 @@ def _inside(folder: Path) -> list[Path]:
 
 
 def _raw_frames(paths: Sequence[Path], dark: Sequence[Path], layout: Layout) -> FrameSet:
-    first = read_raw(paths[0])
+    first = read_stored(paths[0])
     headers = {path: read_header(path) for path in (*paths, *dark)}
+    name = headers[paths[0]].camera
     for path, header in headers.items():
-        if header.camera != first.camera:
+        if header.camera != name:
             raise FsidError(
-                f"{path}: is from camera {header.camera!r}, the first frame from {first.camera!r}; "
+                f"{path}: is from camera {header.camera!r}, the first frame from {name!r}; "
                 f"calibrate one camera at a time"
             )
-    camera = Camera(first.camera, first.cfa, first.black_level, first.white_level, bare=False)
+    camera = Camera(name, first.cfa, first.black_level, first.white_level, bare=False, black=first.black)
     if replace(layout, iso=None) != Layout():
         raise FsidError(
             f"{paths[0]}: a RAW file states its CFA, levels and size itself; leave the options out"
