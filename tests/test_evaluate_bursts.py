@@ -17,6 +17,7 @@ from fsid.evaluate.bursts import average
 from fsid.sensor import Raw, load_profile, noisy_from_clean, read_raw, write_dng
 from fsid.sensor.metadata import ORIENTATION, Metadata
 from fsid.sensor.tiff import SHORT, Tag
+from stated_black import state_black
 
 FRAMES = 12
 PROFILE = load_profile("pixel6")
@@ -114,6 +115,15 @@ def test_a_first_frame_that_the_shutter_shook_leaves_no_bare_edge(clean: Raw, tm
     assert (truth.mosaic - clean.mosaic[:-4, 6:])[clean.mosaic[:-4, 6:] < 0.9].std() < 1.3 * quality.error
     expected = psnr(noisy.mosaic, clean.mosaic[:-4, 6:])
     assert psnr(noisy.mosaic, truth.mosaic) == pytest.approx(expected, abs=0.5)
+
+
+def test_a_black_level_between_two_integers_leaves_the_noisy_frame_as_it_is(clean: Raw, tmp_path: Path):
+    paths = _burst(tmp_path / "captures" / "star" / "1lux", clean)
+    for path in paths:
+        state_black(path, 129, 2)
+    testset, _ = burst_testset(tmp_path / "captures", tmp_path / "set")
+    noisy = read_raw(testset.noisy(tmp_path / "set", testset.images[0], "1lux"))
+    np.testing.assert_allclose(noisy.mosaic, read_raw(paths[0]).mosaic, atol=1e-6)
 
 
 @pytest.mark.parametrize("change", ["moved", "brighter"])

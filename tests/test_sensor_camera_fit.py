@@ -1,7 +1,6 @@
 """Frames on disk become the profile of the camera that took them."""
 
 import shutil
-import struct
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,6 +21,7 @@ from fsid.sensor import (
     write_dng,
 )
 from fsid.sensor.frames import find_frames
+from stated_black import state_black
 
 PROFILE = load_profile("galaxy-s22")
 SIDE, FRAMES = 192, 20
@@ -53,14 +53,9 @@ def write_arrays(folder: Path, images: list[np.ndarray]) -> list[Path]:
     return paths
 
 
-def write_with_black(path: Path, dn: np.ndarray, black: tuple[int, int]) -> Path:
-    """Those integers as a DNG that states that rational for its black level."""
+def write_dn(path: Path, dn: np.ndarray) -> Path:
     path.parent.mkdir(parents=True, exist_ok=True)
     write_dng(path, replace(scene(), mosaic=((dn - 64) / (1023 - 64)).astype(np.float32), iso=100))
-    data, whole = path.read_bytes(), struct.pack("<HHII", 50714, 4, 1, 64)
-    assert data.count(whole) == 1
-    rational = struct.pack("<HHII", 50714, 5, 1, len(data))
-    path.write_bytes(data.replace(whole, rational) + struct.pack("<II", *black))
     return path
 
 
@@ -243,7 +238,8 @@ def test_a_black_level_between_two_integers_rounds_nothing_twice(tmp_path, rng, 
         for number in range(FRAMES):
             noise = np.sqrt(0.1 * light_dn + 0.8 - 1 / 12) * rng.standard_normal(light_dn.shape)
             path = tmp_path / f"{light_dn.max():.0f}" / f"{number}.dng"
-            paths.append(write_with_black(path, np.rint(64.5 + light_dn + noise), blacks[number % 2]))
+            paths.append(write_dn(path, np.rint(64.5 + light_dn + noise)))
+            state_black(path, *blacks[number % 2])
     fit = calibrate(bursts[0], name="x", dark=bursts[1]).fits[0]
     np.testing.assert_allclose(fit.black, 64.5, atol=0.02)
     np.testing.assert_allclose(fit.sigma2_dn, 0.8, rtol=0.03)

@@ -28,7 +28,17 @@ from skimage.registration import phase_cross_correlation
 from fsid.errors import FsidError
 from fsid.evaluate.testset import Progress, TestImage, TestSet, staged, write_testset
 from fsid.files import write_atomically
-from fsid.sensor import NoiseLevel, Raw, clean_levels, estimate_noise, load_profile, pack, read_raw, write_dng
+from fsid.sensor import (
+    NoiseLevel,
+    Raw,
+    clean_levels,
+    estimate_noise,
+    exact_levels,
+    load_profile,
+    pack,
+    read_raw,
+    write_dng,
+)
 
 OUTLIER_SIGMA = 4.0
 MAX_FLICKER = 0.2
@@ -127,7 +137,7 @@ def burst_testset(
                 raw = _cut(read_raw(path), window)
                 name = name or raw.camera
                 target = root / scene / f"{level}.noisy{f'.{frame:02d}' if frame else ''}.dng"
-                write_dng(target, replace(raw, noise=_noise(raw, camera, path)))
+                write_dng(target, exact_levels(replace(raw, noise=_noise(raw, camera, path))))
             qualities.append(quality)
         progress(len(bursts), len(bursts))
         images = tuple(TestImage(scene, scene) for scene in scenes)

@@ -22,7 +22,7 @@ from fsid.sensor.profiles import (
     profile_names,
     save_profile,
 )
-from fsid.sensor.quantise import clean_levels, from_dn, quantise, to_dn
+from fsid.sensor.quantise import clean_levels, exact_levels, from_dn, quantise, to_dn
 from fsid.sensor.raw import CFA_PATTERNS, NoiseLevel, Raw
 from fsid.sensor.temporal import TemporalStatistics
 from fsid.sensor.terms import NoiseTerms, add_noise_terms
@@ -58,6 +58,7 @@ __all__ = [
     "dimmed",
     "dng_pixel_offset",
     "estimate_noise",
+    "exact_levels",
     "expose",
     "exposure_rand",
     "far_extrapolated",

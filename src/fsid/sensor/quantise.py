@@ -16,6 +16,8 @@ from fsid.sensor.raw import Raw
 MAX_DN = 65535
 ROUNDING_DN2 = 1 / 12  # variance of a uniform error one DN wide: what rounding adds to noise above half a DN
 
+_WHOLE_DN = 0.05  # off an integer, up to which x is that of an integer
+
 
 def to_dn(raw: Raw) -> np.ndarray:
     """Integers that `raw`'s camera would have stored: (H, W) uint16, 0..white_level. FsidError for NaN."""
@@ -51,6 +53,16 @@ def clean_levels(raw: Raw) -> Raw:
     while 2 * scale * raw.white_level <= MAX_DN:
         scale *= 2
     return replace(raw, black_level=raw.black_level * scale, white_level=raw.white_level * scale)
+
+
+def exact_levels(raw: Raw) -> Raw:
+    """The same image with levels under which `to_dn` makes no two values one: its own, or `clean_levels`.
+
+    Where a file states a black level between two integers, x lies between the integers of the rounded one.
+    """
+    dn = raw.mosaic * np.float32(raw.white_level - raw.black_level) + np.float32(raw.black_level)
+    dn -= np.rint(dn)
+    return raw if float(np.max(np.abs(dn, out=dn))) < _WHOLE_DN else clean_levels(raw)
 
 
 def check_levels(black_level: float, white_level: float, where: str) -> None:
