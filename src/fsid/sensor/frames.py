@@ -8,6 +8,7 @@ mean level agrees within 3 % or half a DN are one burst. Frames are opened one b
 from __future__ import annotations
 
 import math
+import os
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -139,12 +140,16 @@ def frame_files(paths: Sequence[Path]) -> list[Path]:
 
 
 def _inside(folder: Path) -> list[Path]:
-    """The files of a folder and of its folders, hidden ones left out."""
+    """The files of a folder and of its folders, hidden ones left out; OSError where one may not be read."""
 
-    def hidden(path: Path) -> bool:
-        return any(part.startswith(".") for part in path.relative_to(folder).parts)
+    def refuse(error: OSError) -> None:
+        raise error
 
-    return sorted(path for path in folder.rglob("*") if path.is_file() and not hidden(path))
+    files: list[Path] = []
+    for top, folders, names in os.walk(folder, onerror=refuse):
+        folders[:] = [name for name in folders if not name.startswith(".")]
+        files += [Path(top, name) for name in names if not name.startswith(".")]
+    return sorted(path for path in files if path.is_file())
 
 
 def _raw_frames(paths: Sequence[Path], dark: Sequence[Path], layout: Layout) -> FrameSet:
