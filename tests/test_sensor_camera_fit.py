@@ -244,6 +244,9 @@ def test_a_black_level_between_two_integers_rounds_nothing_twice(tmp_path, rng, 
     np.testing.assert_allclose(fit.black, 64.5, atol=0.02)
     np.testing.assert_allclose(fit.sigma2_dn, 0.8, rtol=0.03)
     within(fit.sigma2_dn, 0.8, fit.sigma2_dn_error)
+    stated = calibrate(bursts[0], name="x").fits[0]
+    np.testing.assert_allclose(stated.black, blacks[0][0] / blacks[0][1])
+    within(stated.sigma2_dn, 0.8, stated.sigma2_dn_error)
 
 
 def _fails(match, *arguments, **options):

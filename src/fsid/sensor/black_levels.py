@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fsid.sensor.mosaic import pack
 from fsid.sensor.quantise import from_dn
 
 
@@ -43,10 +44,19 @@ class BlackLevels:
 
         Fractions of a DN stay: rounded once more, integers would fall together. 0 and white stay too.
         """
-        rows, columns = (np.arange(side) % n for side, n in zip(dn.shape, self.tile.shape, strict=True))
+        above = np.rint(self._above(black, dn.shape))
+        moved = np.where((dn > 0) & (dn < white), dn - above, dn)
+        return np.clip(moved, 0, white).astype(np.uint16)
+
+    def of_sites(self, black: int, cfa: str) -> np.ndarray:
+        """(4,) mean black level that `levelled` leaves R, Gr, Gb, B, fractions included."""
+        height, width = len(self.of_row) // 2 * 2, len(self.of_column) // 2 * 2
+        above = self._above(black, (height, width))
+        return black + pack(above - np.rint(above), cfa).mean(axis=(1, 2), dtype=np.float64)
+
+    def _above(self, black: int, shape: tuple[int, ...]) -> np.ndarray:
+        rows, columns = (np.arange(side) % n for side, n in zip(shape, self.tile.shape, strict=True))
         above = (self.tile - black).astype(np.float32)[np.ix_(rows, columns)]
         above += self.of_row[: len(rows), None]
         above += self.of_column[: len(columns)]
-        np.rint(above, out=above)
-        moved = np.where((dn > 0) & (dn < white), dn - above, dn)
-        return np.clip(moved, 0, white).astype(np.uint16)
+        return above

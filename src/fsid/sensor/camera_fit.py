@@ -162,7 +162,7 @@ def _pool_dark(reader: _Reader, iso: float, frames: list[Frame]) -> tuple[np.nda
     The shortest exposure is the black level, of bare mosaics the lowest one; the others are dark current.
     """
     camera = reader.found.camera
-    black = None if camera.black_level is None else _per_site(camera.black_level, camera.cfa)
+    black = camera.site_black()
     pooled: list[_Pooled] = []
     shortest_first = sorted(bursts(frames), key=lambda burst: (burst[0].exposure_s, burst[0].level))
     for number, burst in enumerate(shortest_first):
@@ -264,7 +264,3 @@ def _notes(reader: _Reader, isos: Sequence[float], fits: Sequence[NoiseFit]) -> 
     for iso, fit in zip(isos, fits, strict=True):
         if (error := float(np.max(fit.k_dn_error / fit.k_dn))) > UNCERTAIN:
             yield f"ISO {iso:g}: k is uncertain by {100 * error:.1f} %; take more frames"
-
-
-def _per_site(black: float, cfa: str | None) -> np.ndarray:
-    return np.full(1 if cfa is None else 4, float(black))

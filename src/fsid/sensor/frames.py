@@ -44,6 +44,14 @@ class Camera:
     bare: bool
     black: BlackLevels | None = None
 
+    def site_black(self) -> np.ndarray | None:
+        """(4,) black level of sites in what `FrameSet.read` returns, (1,) without a CFA; None if unknown."""
+        if self.black_level is None:
+            return None
+        if self.black is None or self.cfa is None:
+            return np.full(1 if self.cfa is None else 4, float(self.black_level))
+        return self.black.of_sites(self.black_level, self.cfa)
+
 
 @dataclass(frozen=True)
 class Frame:
