@@ -9,12 +9,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import skimage
 import tifffile
-from PIL import ExifTags, Image, ImageOps
+from PIL import ExifTags, Image, ImageCms, ImageOps
 from scipy.ndimage import gaussian_filter, map_coordinates
 
 from fsid.config import given_keys, load_settings
 from fsid.dataset import GenerateConfig, Sample, check_given, encode, make_sample, read_photo
+from fsid.dataset.attempt import _half_precision
 from fsid.dataset.pictures import read_exr
 from fsid.dataset.tasks import BURST_FRAMES, scene_config
 from fsid.errors import FsidError
@@ -244,3 +246,35 @@ def test_photographs_of_other_numbers_are_refused(kind: type, tmp_path: Path) ->
     tifffile.imwrite(tmp_path / "odd.tif", np.ones((40, 32), kind))
     with pytest.raises(FsidError, match=r"odd\.tif: cannot be read as a photograph \(its values"):
         read_photo(tmp_path / "odd.tif")
+
+
+def test_a_photograph_of_a_wider_colour_space_is_brought_to_srgb():
+    """One in Adobe RGB (1998), against the formulas of its specification."""
+    path = Path(skimage.__file__).parent / "data" / "rocket.jpg"
+    pixels = read_photo(path)
+    height, width = pixels.shape[:2]
+    with Image.open(path) as image:
+        assert b"Adobe RGB" in image.info["icc_profile"]
+        light = (np.asarray(image)[:height, :width] / 255.0) ** (563 / 256)
+    to_xyz = [[0.57667, 0.18556, 0.18823], [0.29734, 0.62736, 0.07529], [0.02703, 0.07069, 0.99134]]
+    to_srgb = [[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]]
+    linear = light @ (np.array(to_srgb) @ to_xyz).T
+    inside = ((linear > 0.002) & (linear < 0.998)).all(-1)
+    expected = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * abs(linear) ** (1 / 2.4) - 0.055)
+    assert inside.mean() > 0.5
+    np.testing.assert_allclose(pixels[inside], expected[inside], atol=2.5 / 255)
+
+
+LAB = ImageCms.ImageCmsProfile(ImageCms.createProfile("LAB")).tobytes()
+
+
+@pytest.mark.parametrize("profile", [b"no profile", LAB])
+def test_a_profile_that_does_not_fit_is_left_aside(profile: bytes, tmp_path: Path):
+    colours = np.arange(40 * 40 * 3, dtype=np.uint8).reshape(40, 40, 3)
+    Image.fromarray(colours).save(tmp_path / "a.png", icc_profile=profile)
+    np.testing.assert_array_equal(np.rint(read_photo(tmp_path / "a.png") * 255), colours)
+
+
+def test_flow_that_half_precision_cannot_hold_is_none():
+    flow = np.array([1e5, -1e5, np.nan, 1.5], np.float32)
+    np.testing.assert_array_equal(_half_precision(flow), np.array([np.nan, np.nan, np.nan, 1.5], np.float16))

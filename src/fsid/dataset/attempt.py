@@ -198,7 +198,7 @@ class Attempt:
             more: dict[str, Raw | np.ndarray] = {f"noisy{i}": raw for i, raw in enumerate(others, 1)}
             if inputs[0] is not clean:
                 more["degraded"] = inputs[0]
-            more |= {name: each.astype(np.float16) for name, each in flow.items()}
+            more |= {name: _half_precision(each) for name, each in flow.items()}
             yield Sample(sample_key(index), clean, noisy, record, more)
 
     def _stream(self, *place: int) -> np.random.SeedSequence:
@@ -206,6 +206,14 @@ class Attempt:
 
     def _rng(self, *place: int) -> np.random.Generator:
         return np.random.default_rng(self._stream(*place))
+
+
+def _half_precision(flow: np.ndarray) -> np.ndarray:
+    """float16 of pixels, NaN where they are more than that holds: far beyond any image."""
+    with np.errstate(over="ignore"):
+        half = flow.astype(np.float16)
+    half[np.isinf(half)] = np.nan
+    return half
 
 
 @dataclass(frozen=True)

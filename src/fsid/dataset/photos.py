@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import io
 import struct
 from pathlib import Path
 
 import numpy as np
-from PIL import ExifTags, Image
+from PIL import ExifTags, Image, ImageCms
 
 from fsid.errors import FsidError
 from fsid.sensor import upright
 
 SMALLEST_PX = 32
+_WITHOUT_ALPHA = {"P": "RGB", "PA": "RGB", "RGBA": "RGB", "RGBX": "RGB", "LA": "L", "1": "L"}
 PHOTO_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".bmp")
 
 
@@ -33,7 +35,10 @@ def files_inside(folder: Path, suffixes: tuple[str, ...]) -> list[Path]:
 
 
 def read_photo(path: str | Path) -> np.ndarray:
-    """(H, W, 3) float32 sRGB-encoded 0..1, upright, cropped to even size; FsidError where unreadable."""
+    """(H, W, 3) float32 sRGB-encoded 0..1, upright, cropped to even size; FsidError where unreadable.
+
+    Colours of another space, which an ICC profile in the file states, are brought to sRGB and clipped there.
+    """
     pixels = _read(path)
     height, width = (size // 2 * 2 for size in pixels.shape[:2])
     return pixels[:height, :width]
@@ -72,7 +77,22 @@ def _values(image: Image.Image) -> np.ndarray:
         return grey[..., None].repeat(3, axis=2)
     if image.mode in ("I", "F"):
         raise ValueError("its values are not 8-bit or 16-bit unsigned integers")
-    return np.asarray(image.convert("RGB"), np.float32) / np.float32(255.0)
+    return np.asarray(_in_srgb(image), np.float32) / np.float32(255.0)
+
+
+def _in_srgb(image: Image.Image) -> Image.Image:
+    """RGB, from the colour space of the ICC profile that the image holds; sRGB where none fits."""
+    kind = _WITHOUT_ALPHA.get(image.mode, image.mode)
+    bare = image if kind == image.mode else image.convert(kind)
+    try:
+        profile = ImageCms.ImageCmsProfile(io.BytesIO(image.info["icc_profile"]))
+        if not ImageCms.getProfileDescription(profile).startswith("sRGB"):
+            srgb = ImageCms.createProfile("sRGB")
+            found = ImageCms.profileToProfile(bare, profile, srgb, outputMode="RGB")
+            return bare.convert("RGB") if found is None else found
+    except (KeyError, OSError, ImageCms.PyCMSError):  # none, broken, or of another kind of image
+        pass
+    return bare.convert("RGB")
 
 
 def crop_rand(rng: np.random.Generator, pixels: np.ndarray, height: int, width: int) -> np.ndarray:
