@@ -36,6 +36,7 @@ def folder(tmp_path: Path) -> Path:
     (tmp_path / "part.yaml").write_text("generate: 3")
     (tmp_path / "text.safetensors").write_text("not weights")
     (tmp_path / "empty").mkdir()
+    (tmp_path / "zeros.raw").write_bytes(bytes(768 * 512 * 2))  # as long as the RAW of some camera
     (tmp_path / "loop.dng").symlink_to(tmp_path / "loop.dng")
     np.save(tmp_path / "nan.npy", np.full((64, 64), np.nan, np.float32))
     Image.new("L", (64, 64)).save(tmp_path / "gray8.png")
@@ -108,6 +109,7 @@ CASES = [
     ("profiles {0}/text.yaml", "text.yaml"),
     ("develop {0}/none.dng {0}/out.png", "none.dng"),
     ("develop {0}/text.dng {0}/out.png", "text.dng"),
+    ("develop {0}/zeros.raw {0}/out.png", "zeros.raw: has no header"),
     ("train {0}/none -o {0}/out", "none"),
     ("train {0}/empty -o {0}/out", "empty"),
     ("train {0}/empty -o {0}/out --set no_such_key=1", "no_such_key"),

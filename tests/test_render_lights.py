@@ -314,6 +314,11 @@ def test_the_sampler_gives_a_sky_to_open_air_alone() -> None:
         ("b.hdr", b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 16 +X 32\n" + bytes(99), "no complete Radiance"),
         ("c.hdr", b"#?RADIANCE\n\n-Y 16 +X 16\n" + bytes(16 * 16 * 4), "equirectangular"),
         ("d.exr", b"\x76\x2f\x31\x01", r"d\.exr: is truncated"),
+        (
+            "e.hdr",
+            b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 16 +X 32\n" + bytes(8 * 32 * 4) + b"@@@\x81" * 8 * 32,
+            r"e\.hdr: its upper half is black",
+        ),
     ],
 )
 def test_a_broken_sky_is_named(tmp_path, name: str, content: bytes, message: str) -> None:

@@ -24,6 +24,8 @@ _ZENITH = np.array([0.42, 0.8, 1.7])
 _HORIZON = np.array([1.2, 1.25, 1.3])
 _THIN_CLOUD, _THICK_CLOUD = np.array([1.6, 1.75, 1.95]), np.array([0.75, 0.85, 1.0])
 _GROUND = 0.25
+_LEAST_LIGHT = 1e-6
+"""Mean of the upper half of a picture, relative to its brightest value, that is no darkness."""
 
 
 def panorama(sky: Sky) -> np.ndarray:
@@ -47,13 +49,18 @@ def _pictured(sky: Sky) -> np.ndarray:
 
 def _scaled(sky: Sky, picture: np.ndarray) -> np.ndarray:
     """`picture` turned, its mean as the sky's."""
+    mean = _mean_above(picture)
+    if sky.source != "procedural":
+        mean = np.full(3, float(mean @ LUMINANCE))
+    turned = np.roll(picture, round(sky.azimuth_deg / 360 * picture.shape[1]), axis=1)
+    return (turned * (np.array(sky.colour) / mean)).astype(np.float32)
+
+
+def _mean_above(picture: np.ndarray) -> np.ndarray:
+    """(3,) mean of the upper half by solid angle."""
     elevation, _ = angles(len(picture))
     weight = np.cos(elevation) * (elevation > 0)
-    mean = (picture * weight[:, None, None]).sum((0, 1)) / (weight.sum() * picture.shape[1])
-    if sky.source != "procedural":
-        mean = np.full(3, max(float(mean @ LUMINANCE), 1e-12))
-    turned = np.roll(picture, round(sky.azimuth_deg / 360 * picture.shape[1]), axis=1)
-    return (turned * (np.array(sky.colour) / np.maximum(mean, 1e-12))).astype(np.float32)
+    return np.asarray((picture * weight[:, None, None]).sum((0, 1)) / (weight.sum() * picture.shape[1]))
 
 
 def angles(height: int) -> tuple[np.ndarray, np.ndarray]:
@@ -136,7 +143,10 @@ def _equirectangular(picture: np.ndarray, path: Path) -> np.ndarray:
         raise FsidError(f"{path}: {width} x {height} is no equirectangular picture (twice as wide as high)")
     if not np.isfinite(picture).all():
         raise FsidError(f"{path}: holds NaN or infinite values")
-    return picture.clip(min=0)
+    picture = picture.clip(min=0)
+    if not _mean_above(picture) @ LUMINANCE > _LEAST_LIGHT * picture.max():
+        raise FsidError(f"{path}: its upper half is black and gives no light; turn it over or leave it out")
+    return picture
 
 
 def _radiance_hdr(data: bytes, path: Path) -> np.ndarray:

@@ -21,6 +21,7 @@ import rawpy
 from fsid.errors import FsidError
 from fsid.files import write_atomically
 from fsid.sensor import dng_tags
+from fsid.sensor.bare import HEADERLESS_SUFFIXES
 from fsid.sensor.black_levels import BlackLevels
 from fsid.sensor.colour import published_matrices
 from fsid.sensor.embedded import embedded_directories
@@ -181,6 +182,8 @@ def _mosaic_directory(directories: list[dict[int, Tag]]) -> dict[int, Tag]:
 def _read_source(path: Path) -> _Source:
     with path.open("rb") as file:
         directories = read_directories(file) or embedded_directories(file)
+        if not directories and path.suffix.lower() in HEADERLESS_SUFFIXES:  # LibRaw guesses by the length
+            raise FsidError(f"{path}: has no header that says what it holds; it is a bare mosaic")
         mosaic = _mosaic_directory(directories)
         check_intact(file, mosaic, path)
     if SAMPLE_FORMAT in mosaic and mosaic[SAMPLE_FORMAT].values == (_FLOATING_POINT,):
