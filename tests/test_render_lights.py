@@ -285,6 +285,7 @@ def simple_scene(**light: object):
         ({"kind": "laser"}, r"lights\[0\].kind 'laser'"),
         ({"kind": "area"}, r"lights\[0\].size_m"),
         ({"kind": "sun", "direction": (0.0, 0.0, 0.0)}, r"lights\[0\].direction"),
+        ({"colour": (1.0, -1.0, 1.0)}, r"lights\[0\].colour"),
     ],
 )
 def test_a_light_that_makes_no_sense_is_named(light: dict, message: str) -> None:

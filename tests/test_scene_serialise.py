@@ -1,6 +1,7 @@
 """scene_from_json(scene_to_json(s)) == s exactly, and nothing else is accepted."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fsid.errors import FsidError
+from fsid.render.gltf import glb_bytes
 from fsid.scene import VARIANTS, SceneConfig, sample, scene_from_json, scene_to_json
 
 FEW = SceneConfig(objects=(2, 4))
@@ -85,3 +87,30 @@ def test_a_scene_of_numpy_numbers_is_the_same():
         for kind, s in zip((int, np.int64), sizes, strict=True)
     )
     assert numpy == plain
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "words"),
+    [
+        (("cameras", 0, "height"), 0, r"scene\.cameras\[0\]: \d+x0 pixels"),
+        (("cameras", 0, "fov_deg"), 180.0, r"scene\.cameras\[0\]\.fov_deg"),
+        (("transforms", 0, "scale"), [1.0, 0.0, 1.0], r"scene\.transforms\[0\]\.scale"),
+        (("materials", 0, 0, "tile_m"), 0.0, r"scene\.materials\[0\]\[0\]\.tile_m"),
+        (("lights", 0, "kind"), "laser", r"scene\.lights\[0\]\.kind 'laser'"),
+    ],
+)
+def test_a_value_that_nothing_can_be_made_of_is_named(data, place, value, words):
+    *way, last = place
+    inner = data
+    for key in way:
+        inner = inner[key]
+    inner[last] = value
+    with pytest.raises(FsidError, match=words):
+        scene_from_json(json.dumps(data))
+
+
+def test_no_file_is_made_of_such_a_scene():
+    scene = sample(SceneConfig(objects=(1, 1)), 0, width=32, height=32)
+    flat = replace(scene, transforms=(replace(scene.transforms[0], scale=(1.0, 0.0, 1.0)),))
+    with pytest.raises(FsidError, match=r"transforms\[0\]\.scale"):
+        glb_bytes(flat)

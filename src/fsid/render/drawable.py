@@ -13,7 +13,8 @@ import numpy as np
 from fsid.assets import Mesh, build_background, build_mesh
 from fsid.assets.solids import rotation_matrix
 from fsid.errors import FsidError
-from fsid.render.shadows import KINDS, half_axes
+from fsid.render.shadows import half_axes
+from fsid.scene.check import check_scene
 from fsid.scene.model import (
     ZERO,
     Background,
@@ -104,8 +105,7 @@ def view_of(scene: Scene, camera_index: int) -> View:
     """The background and the objects of a scene from one of its cameras. Raises FsidError."""
     if not 0 <= camera_index < len(scene.cameras):
         raise FsidError(f"camera_index {camera_index}: the scene has {len(scene.cameras)} cameras")
-    for i, light in enumerate(scene.lights):
-        _check_light(i, light)
+    check_scene(scene)
     open_air = scene.background.kind == "open-air"
     background = background_drawable(scene.background)
     if scene.sky is not None and not open_air:
@@ -126,15 +126,6 @@ def view_of(scene: Scene, camera_index: int) -> View:
         room_floor_m=floor,
         sky=(scene.sky or Sky("procedural", scene.ambient)) if open_air else None,
     )
-
-
-def _check_light(i: int, light: Light) -> None:
-    if light.kind not in KINDS:
-        raise FsidError(f"scene.lights[{i}].kind '{light.kind}' is not known; use {', '.join(KINDS)}")
-    if light.kind == "area" and not min(light.size_m) > 0:
-        raise FsidError(f"scene.lights[{i}].size_m = {light.size_m}: an area light needs two lengths above 0")
-    if light.kind != "point" and not np.linalg.norm(light.direction) > 0:
-        raise FsidError(f"scene.lights[{i}].direction = {light.direction}: must not be zero")
 
 
 def _objects(scene: Scene) -> list[Drawable]:

@@ -25,6 +25,7 @@ from fsid.render import gltf_textures as textures
 from fsid.render.camera import NEAR_M, lens_of
 from fsid.render.parts import Part, parts_of
 from fsid.scene import scene_to_json
+from fsid.scene.check import check_scene
 from fsid.scene.model import Camera, Light, Material, Scene
 
 LUMENS_PER_WATT = 683.0
@@ -47,6 +48,7 @@ def write_glb(path: Path, scene: Scene, *, texture_size: int = 512) -> None:
 
 def glb_bytes(scene: Scene, *, texture_size: int = 512) -> bytes:
     """The content of the .glb of a scene; the same scene always gives the same bytes. FsidError."""
+    check_scene(scene)
     document = _Document(texture_size)
     for number, group in groupby(parts_of(scene, 0.0), key=lambda part: part.object_id):
         document.add_body(number, list(group))

@@ -14,6 +14,7 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 
 from fsid.assets import BACKGROUND_PARTS
 from fsid.errors import FsidError
+from fsid.scene.check import check_scene
 from fsid.scene.lens import check_distortion, corner_radius
 from fsid.scene.model import Scene
 
@@ -43,6 +44,7 @@ def scene_from_json(text: str) -> Scene:
     named = set(scene.background.materials) == set(BACKGROUND_PARTS[kind])
     surfaces = ", ".join(BACKGROUND_PARTS[kind])
     _expect(named, "scene.background.materials", f"one material for each of {surfaces}")
+    check_scene(scene)
     for camera in scene.cameras:
         if camera.distortion is not None:
             check_distortion(camera.distortion, corner_radius(camera))

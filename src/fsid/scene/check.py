@@ -1,0 +1,54 @@
+"""What a scene must be for any renderer or exporter, as it may have been written by hand."""
+
+from __future__ import annotations
+
+from itertools import chain
+
+import numpy as np
+
+from fsid.errors import FsidError
+from fsid.scene.model import Camera, Light, Material, Scene
+
+LIGHT_KINDS = ("point", "spot", "sun", "area")
+
+
+def check_scene(scene: Scene) -> None:
+    """FsidError that names the value which makes no sense, by its key in the scene's JSON."""
+    for i, camera in enumerate(scene.cameras):
+        _check_camera(f"scene.cameras[{i}]", camera)
+    for i, light in enumerate(scene.lights):
+        _check_light(f"scene.lights[{i}]", light)
+    for i, transform in enumerate(scene.transforms):
+        if 0 in transform.scale:
+            raise FsidError(f"scene.transforms[{i}].scale = {transform.scale}: must not be zero")
+    of_objects = (
+        (f"scene.materials[{i}][{part}]", material)
+        for i, parts in enumerate(scene.materials)
+        for part, material in enumerate(parts)
+    )
+    of_background = ((f"scene.background.materials.{k}", m) for k, m in scene.background.materials.items())
+    for where, material in chain(of_objects, of_background):
+        _check_material(where, material)
+
+
+def _check_camera(where: str, camera: Camera) -> None:
+    if min(camera.width, camera.height) < 1:
+        raise FsidError(f"{where}: {camera.width}x{camera.height} pixels; at least 1x1 are needed")
+    if not 0 < camera.fov_deg < 180:
+        raise FsidError(f"{where}.fov_deg = {camera.fov_deg:g}: must lie between 0 and 180 degrees")
+
+
+def _check_light(where: str, light: Light) -> None:
+    if light.kind not in LIGHT_KINDS:
+        raise FsidError(f"{where}.kind '{light.kind}' is not known; use {', '.join(LIGHT_KINDS)}")
+    if light.kind == "area" and not min(light.size_m) > 0:
+        raise FsidError(f"{where}.size_m = {light.size_m}: an area light needs two lengths above 0")
+    if light.kind != "point" and not np.linalg.norm(light.direction) > 0:
+        raise FsidError(f"{where}.direction = {light.direction}: must not be zero")
+    if not min(light.colour) >= 0:
+        raise FsidError(f"{where}.colour = {light.colour}: there is no light below 0")
+
+
+def _check_material(where: str, material: Material) -> None:
+    if not material.tile_m > 0:
+        raise FsidError(f"{where}.tile_m = {material.tile_m:g}: must be above 0")
