@@ -15,7 +15,7 @@ from fsid.render.camera import lens_of
 from fsid.render.drawable import View
 from fsid.render.flow import flow_between
 from fsid.scene import SceneConfig, sample
-from fsid.scene.distortion import distorted, undistorted
+from fsid.scene.distortion import distorted, reach, undistorted
 from fsid.scene.model import Camera, Distortion, Motion, Transform
 from render_scenes import FROM_ABOVE, bake_plain, block, grid, lambertian, point_light, sphere, view
 
@@ -164,6 +164,33 @@ def test_flow_of_a_still_camera_is_zero_and_nan_outside(renderer: Renderer) -> N
     flow = flow_between(frame, what.drawables, here, here, LABEL_SAMPLE)
     assert np.abs(flow[frame.object_id == 0]).max() < 1e-4
     assert np.isnan(flow[frame.object_id == -1]).all()
+
+
+FOLDS = {
+    "barrel": Distortion("brown-conrady", (-0.25, 0.0, 0.0, 0.0, 0.0)),
+    "fisheye": Distortion("fisheye", (-0.3, 0.0, 0.0, 0.0)),
+}
+
+
+@pytest.mark.parametrize("name", FOLDS)
+def test_a_lens_reaches_to_where_its_image_folds(name: str) -> None:
+    radius = reach(FOLDS[name]) * np.array([0.97, 0.98, 0.99, 1.01, 1.02, 1.03])
+    seen = distorted(FOLDS[name], np.stack([radius, 0 * radius], -1))[:, 0]
+    assert (np.sign(np.diff(seen))[[0, 1, 3, 4]] == [1, 1, -1, -1]).all()
+    assert reach(BARREL) == reach(FISHEYE) == reach(None) == np.inf
+
+
+@pytest.mark.parametrize("name", FOLDS)
+def test_flow_ends_where_the_lens_of_the_other_camera_does(renderer: Renderer, name: str) -> None:
+    """Along a row of the floor the other camera, turned to the right, sees one point right of the other."""
+    what = view(lambertian(grid(8.0)))
+    turned = replace(what.camera, target_m=(1.5, 0.0, 0.0), fov_deg=40.0, distortion=FOLDS[name])
+    frame = draw(renderer, what)
+    here, there = ((camera, lens_of(camera), 0.0) for camera in (what.camera, turned))
+    flow = flow_between(frame, what.drawables, here, there, LABEL_SAMPLE)[48, :, 0]
+    seen = np.arange(96) + flow
+    assert 0 < np.isnan(flow).sum() < 70
+    assert (np.diff(seen[np.isfinite(flow)]) > 0).all()
 
 
 def test_render_gives_flow_to_another_camera(renderer: Renderer) -> None:

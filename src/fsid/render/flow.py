@@ -15,7 +15,7 @@ import numpy as np
 from fsid.render.camera import Lens
 from fsid.render.drawable import UNMOVED, Drawable
 from fsid.render.frame import Frame
-from fsid.scene.distortion import distorted, undistorted
+from fsid.scene.distortion import distorted, reach, undistorted
 from fsid.scene.model import Camera
 
 
@@ -26,7 +26,8 @@ def flow_between(
     there: tuple[Camera, Lens, float],
     sample: float,
 ) -> np.ndarray:
-    """(H, W, 2) float32 pixels right and down; NaN where nothing was hit or it lies behind the other camera.
+    """(H, W, 2) float32 pixels right and down; NaN where nothing was hit, or where it lies behind the other
+    camera or beyond what its lens has an image of.
 
     here, there: camera, lens and time of both images. sample: place of the labels' sample in a pixel, 0..1.
     """
@@ -48,6 +49,7 @@ def flow_between(
     hit &= local[..., 2] > 1e-6
     ahead = np.where(hit, local[..., 2], 1.0)
     image = np.stack([local[..., 0] / ahead, -local[..., 1] / ahead], axis=-1)
+    hit &= np.linalg.norm(image, axis=-1) < reach(other.distortion)
     half = np.array([other.width, other.height]) / 2
     moved = (distorted(other.distortion, image) * other_lens.focal + 1) * half
     return np.where(hit[..., None], moved - seen, np.nan).astype(np.float32)

@@ -16,8 +16,8 @@ class Frame:
     depth: (H, W) metres along the viewing axis, inf where nothing was hit.
     object_id: (H, W) int32, index into `scene.objects`; -1 is the background.
     flow: (H, W, 2) pixels right and down from where a surface point is seen here to where the other camera
-    that was asked for sees it (also where it is hidden there); NaN where nothing was hit. None where no other
-    camera was named.
+    that was asked for sees it (also where it is hidden there); NaN where nothing was hit, or it lies behind
+    that camera or beyond what its lens has an image of. None where no other camera was named.
     The labels (all but radiance) are those of the middle of the exposure and of the sharp image.
     """
 

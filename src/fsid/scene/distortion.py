@@ -40,6 +40,20 @@ def distorted(distortion: Distortion | None, points: np.ndarray) -> np.ndarray:
     )
 
 
+def reach(distortion: Distortion | None) -> float:
+    """Pinhole radius up to which the distorted one grows; what lies beyond the polynomial folds back."""
+    if distortion is None:
+        return float("inf")
+    fisheye = distortion.model == "fisheye"
+    k = distortion.coefficients if fisheye else (*distortion.coefficients[:2], distortion.coefficients[4])
+    slope = [1.0, *((2 * i + 1) * value for i, value in enumerate(k, 1))]  # in radius^2, or angle^2
+    folds = [root.real for root in np.roots(slope[::-1]) if abs(root.imag) < 1e-9 and root.real > 0]
+    first = float(np.sqrt(min(folds, default=np.inf)))
+    if fisheye:
+        return float(np.tan(first)) if first < np.pi / 2 else float("inf")
+    return first
+
+
 def undistorted(distortion: Distortion | None, points: np.ndarray) -> np.ndarray:
     """The inverse of `distorted` (Newton's method). FsidError where the lens cannot be inverted there."""
     if distortion is None:
