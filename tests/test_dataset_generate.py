@@ -86,6 +86,18 @@ def test_another_configuration_in_the_same_folder_is_refused(scenes: Path):
         generate(scenes, small(), count=4, seed=9, shard_size=2)
 
 
+def test_one_dark_picture_stops_no_run(photos: Path, tmp_path: Path):
+    some, data = tmp_path / "some", tmp_path / "data"
+    shutil.copytree(photos, some)
+    Image.new("RGB", (64, 64)).save(some / "black.png")
+    generate(data, small("width=32", "height=32", f"images={some}"), count=2)
+    records = [json.loads(read_member(shard_path(data, 0), f"{key:08d}.json")) for key in range(2)]
+    assert [(r["image"], r["refused"]) for r in records] == [
+        ("coffee-0.png", ["black"] * 3),
+        ("coffee-0.png", []),
+    ]
+
+
 def test_the_corrected_command_goes_into_the_folder_of_the_one_that_failed(photos: Path, tmp_path: Path):
     tiny, night, data = ("width=32", "height=32"), tmp_path / "night", tmp_path / "data"
     night.mkdir()

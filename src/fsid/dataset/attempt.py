@@ -43,6 +43,7 @@ from fsid.sensor import (
 )
 
 _SCENE, _CROP, _EXPOSURE, _COLOUR, _NOISE, _TASK = range(6)
+_WINDOWS = 3
 Window = tuple[int, int, int, int]
 """Left, top, width, height in pixels of the truth."""
 
@@ -120,9 +121,12 @@ class Attempt:
         )
 
     def drawn_picture(self) -> tuple[int, Path]:
-        """The picture that this attempt takes, and its number in `config.images`."""
+        """The picture that this attempt takes, and its number in `config.images`.
+
+        One of which `_WINDOWS` windows were refused is black or blown all over, and the next ones are tried.
+        """
         paths = find_pictures(Path(self.config.images))
-        number = self.frame % len(paths)
+        number = (self.frame + max(len(self.refused) - _WINDOWS + 1, 0)) % len(paths)
         return number, paths[number]
 
     def _is_old(self, looks: list[str]) -> bool:
