@@ -77,9 +77,9 @@ def patches_of_colour(rng: np.random.Generator, size: int = 96) -> Raw:
     return Raw(x, "GBRG", 64, 1023, (2.0, 1.0, 1.5), np.eye(3))
 
 
-def stored(rng: np.random.Generator, number: int) -> tuple[str, dict[str, bytes]]:
+def stored(rng: np.random.Generator, number: int, size: int = 96) -> tuple[str, dict[str, bytes]]:
     buffer = io.BytesIO()
-    write_dng(buffer, clean_levels(patches_of_colour(rng)))
+    write_dng(buffer, clean_levels(patches_of_colour(rng, size)))
     return f"{number:08d}", {"clean.dng": buffer.getvalue()}
 
 
@@ -195,7 +195,7 @@ def test_the_best_network_on_held_out_scenes_is_kept(tmp_path: Path, monkeypatch
     card = json.loads(model.with_suffix(".json").read_text())
     assert card["details"]["validation"] == [rows[int(np.argmax(scores))]]
     assert card["details"]["config"]["seed"] == 0
-    assert card["details"]["shrink"] == [1]
+    assert card["details"]["config"]["shrink"] == [1]
     assert card["sessions"][-1]["first_step"] == 0
     assert card["training"].startswith("8 images")
     last = load_denoiser(tmp_path / "run" / "last.safetensors").net.state_dict()
@@ -225,15 +225,48 @@ def test_a_dataset_that_grew_is_judged_by_what_it_holds_out_now(
         train(folder, run, config, progress=stop)
     write_shard(shard_path(folder, 1), samples[5:])
     card = load_denoiser(train(folder, run, config, quiet=True)).card
-    assert card.details["validation"] == [{"step": 8, "images": 9, "psnr_scenes": 40.0}]
+    row = {"step": 8, "held_out": 1, "held_out_from": 9, "psnr_scenes": 40.0}
+    assert card.details["validation"] == [row]
 
 
 def test_a_run_keeps_the_sizes_that_it_was_begun_with(data: Path, tmp_path: Path) -> None:
     run = tmp_path / "run"
     train(data, run, replace(CONFIG, shrink=(2,), steps=2), quiet=True)
-    assert load_denoiser(train(data, run, replace(CONFIG, steps=2), quiet=True)).card.details["shrink"] == [2]
+    train(data, run, replace(CONFIG, steps=2), quiet=True)
     with pytest.raises(FsidError, match="another shrink"):
         train(data, run, replace(CONFIG, shrink=(1,), steps=2), quiet=True)
+
+
+@pytest.fixture
+def large(tmp_path: Path) -> Path:
+    """An image that is trained on at two sizes."""
+    folder = tmp_path / "large"
+    folder.mkdir()
+    write_shard(shard_path(folder, 0), [stored(np.random.default_rng(0), 0, 960)])
+    return folder
+
+
+def test_a_run_says_the_sizes_that_it_chose(large: Path, tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    train(large, run, replace(CONFIG, steps=2), quiet=True)
+    assert load_settings(TrainConfig, run / "config.yaml").shrink == (1, 2)
+
+
+def test_a_run_of_before_there_were_sizes_draws_images_as_they_are(large: Path, tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    whole = train(large, tmp_path / "whole", replace(CONFIG, shrink=(1,)), quiet=True)
+
+    def stop(done: int, steps: int) -> None:
+        if done == 5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        train(large, run, replace(CONFIG, shrink=(1,)), progress=stop)
+    file = run / "config.yaml"
+    file.write_text("".join(line for line in file.read_text().splitlines(True) if "shrink" not in line))
+    resumed = train(large, run, CONFIG, quiet=True)
+    assert load_file(resumed).keys() == load_file(whole).keys()
+    assert all(torch.equal(load_file(resumed)[key], load_file(whole)[key]) for key in load_file(whole))
 
 
 def test_photographs_are_watched_and_do_not_choose(data: Path, photos: Path, tmp_path: Path) -> None:
@@ -304,9 +337,9 @@ def test_the_corrected_command_goes_into_the_folder_of_the_one_that_failed(
     right = replace(wrong, validation_photos="")
     with held(run, "another test is at work in it"), pytest.raises(FsidError, match="at work"):
         train(data, run, right, quiet=True)
-    assert load_settings(TrainConfig, run / "config.yaml") == wrong
+    assert load_settings(TrainConfig, run / "config.yaml") == replace(wrong, shrink=(1,))
     train(data, run, right, quiet=True)
-    assert load_settings(TrainConfig, run / "config.yaml") == right
+    assert load_settings(TrainConfig, run / "config.yaml") == replace(right, shrink=(1,))
     (run / "checkpoint.safetensors").unlink()
     with pytest.raises(FsidError, match="another validation_photos"):
         train(data, run, wrong, quiet=True)

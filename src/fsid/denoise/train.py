@@ -29,7 +29,7 @@ from torch import Tensor
 
 from fsid.config import as_read, load_settings, read_yaml, save_settings, to_plain
 from fsid.dataset.feed import batches
-from fsid.dataset.index import identity
+from fsid.dataset.index import identity, index_mosaics
 from fsid.dataset.loader import Batch, PatchConfig, PatchDataset
 from fsid.denoise.board import Board
 from fsid.denoise.checkpoint import TrainState, load_checkpoint, save_checkpoint
@@ -90,6 +90,7 @@ def train(
     is_main = accelerator.is_main_process
     kept = held_out(data_dir, config)
     patches = PatchDataset(data_dir, _patch_config(config, len(kept)), config.seed, accelerator.process_index)
+    config = replace(config, shrink=patches.shrink)
     if resume and is_main and not (run_dir / CONFIG_FILE).is_file():
         raise FsidError(f"{run_dir}: holds no training to resume")
     initial = initial_network(run_dir, config, resume=resume)
@@ -106,9 +107,8 @@ def train(
         forward = torch.compile(net) if _compiles(config) else net
         feed = batches(patches, range(state.step, config.steps), config.loader_processes, pin=gpu)
         with LiveLine(config, state.step, accelerator.num_processes, quiet=not shown) as live:
-            card = _card(data_dir, config, patches, initial)
-            images = patches.mosaics
-            keeper = _Keeper(data_dir, images, run_dir, config, accelerator, card, command, state, live)
+            card = _card(data_dir, config, patches.mosaics, initial)
+            keeper = _Keeper(data_dir, run_dir, config, accelerator, card, command, state, live)
             for batch in feed:
                 rate = learning_rate(config, state.step)
                 loss, psnr = _step(accelerator, forward, net, optimizer, batch, rate, config)
@@ -131,7 +131,6 @@ class _Keeper:
     def __init__(
         self,
         data_dir: Path,
-        images: int,
         run_dir: Path,
         config: TrainConfig,
         accelerator: Accelerator,
@@ -142,8 +141,10 @@ class _Keeper:
     ) -> None:
         main = accelerator.is_main_process
         self._run_dir, self._config, self._state, self._live = run_dir, config, state, live
-        self._validation = validation(held_out(data_dir, config) if main else (), config, accelerator.device)
-        self._card, self._images = card, images
+        kept = held_out(data_dir, config) if main else ()
+        self._validation = validation(kept, config, accelerator.device)
+        self._held_out = {"held_out": len(kept), "held_out_from": len(index_mosaics(data_dir)) - len(kept)}
+        self._card = card
         self._session = Session(run_dir, command, state.step, accelerator.num_processes, identity(data_dir))
         self._board = Board(run_dir, state.step, wanted=config.tensorboard and main)
 
@@ -171,7 +172,7 @@ class _Keeper:
         state = self._state
         figures = self._validation.measure(state.average)
         best = max(self._comparable(), default=-np.inf)
-        state.validation.append({"step": state.step, "images": self._images, **figures})
+        state.validation.append({"step": state.step, **self._held_out, **figures})
         self._board.write(state.step, {f"validation/{name}": value for name, value in figures.items()})
         if figures.get(SELECTED, np.inf) > best:
             self._session.save(state.step)
@@ -181,7 +182,8 @@ class _Keeper:
 
     def _comparable(self) -> list[float]:
         """PSNR of networks before on the images held out now: a dataset that grew holds out others."""
-        rows = (row for row in self._state.validation if row.get("images", self._images) == self._images)
+        held_out = self._held_out.items()
+        rows = [row for row in self._state.validation if all(row.get(key, n) == n for key, n in held_out)]
         return [row[SELECTED] for row in rows if SELECTED in row]
 
     def _save(self, net: torch.nn.Module, optimizer: torch.optim.Optimizer) -> None:
@@ -204,12 +206,12 @@ class _Keeper:
         save_model(self._run_dir / name, state.average, card, sessions)
 
 
-def _card(data_dir: Path, config: TrainConfig, patches: PatchDataset, initial: Denoiser | None) -> ModelCard:
+def _card(data_dir: Path, config: TrainConfig, images: int, initial: Denoiser | None) -> ModelCard:
     """The card of the network to come, without results."""
     file = data_dir / CONFIG_FILE
-    training = f"{patches.mosaics} images of {data_dir.resolve().name}"
+    training = f"{images} images of {data_dir.resolve().name}"
     data = read_yaml(file) if file.is_file() else {}
-    details = {"config": to_plain(config), "shrink": list(patches.shrink), "data": data}
+    details = {"config": to_plain(config), "data": data}
     if initial is not None:
         training += f" after {initial.card.training}"
         details["initial"] = to_plain(initial.card)
@@ -255,13 +257,19 @@ def _sizes_as_begun(run_dir: Path, config: TrainConfig) -> TrainConfig:
     file = run_dir / CONFIG_FILE
     if config.shrink or not (file.is_file() and has_network(run_dir)):
         return config
-    return replace(config, shrink=load_settings(TrainConfig, file).shrink)
+    return replace(config, shrink=_begun_with(file).shrink)
+
+
+def _begun_with(file: Path) -> TrainConfig:
+    """The settings in the file of a run; before there was `shrink`, images were drawn as they are."""
+    there = load_settings(TrainConfig, file)
+    return there if "shrink" in read_yaml(file) else replace(there, shrink=(1,))
 
 
 def _prepare_run(data_dir: Path, run_dir: Path, config: TrainConfig, initial: Denoiser | None) -> None:
     """`run_dir` is of `config` and data, whatever a run that failed before its first network left there."""
     file = run_dir / CONFIG_FILE
-    there = load_settings(TrainConfig, file) if file.is_file() else None
+    there = _begun_with(file) if file.is_file() else None
     if there is not None and has_network(run_dir):
         old, new = to_plain(there), to_plain(config)
         if changed := [key for key in new if new[key] != old[key]]:
