@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.ndimage import shift
+from scipy.ndimage import gaussian_filter, shift
 
 from fsid.cli.main import main
 from fsid.errors import FsidError
 from fsid.evaluate import NOISY, burst_testset, compare, psnr, read_testset, simulated_testset
-from fsid.evaluate.bursts import average
+from fsid.evaluate.bursts import _shift, average
 from fsid.sensor import Raw, load_profile, noisy_from_clean, read_raw, write_dng
 from fsid.sensor.metadata import ORIENTATION, Metadata
 from fsid.sensor.tiff import SHORT, Tag
@@ -88,6 +88,18 @@ def test_whole_shifts_are_undone_and_others_left_out(clean: Raw, tmp_path: Path)
     assert quality.shift_px == pytest.approx(np.hypot(4, 6))
     seen = clean.mosaic[window]
     assert (truth.mosaic - seen)[seen < 0.9].std() < 1.3 * quality.error
+
+
+def test_a_far_move_over_a_smooth_texture_is_seen():
+    rng = np.random.default_rng(0)
+    for _ in range(6):
+        texture = gaussian_filter(rng.standard_normal((400, 400)), 3)
+        scene = 0.2 + 0.05 * texture / texture.std()
+        tiles = rng.integers(6, 20, 2)
+        planes = scene[50:350, 50:350], np.roll(scene, tiles, axis=(0, 1))[50:350, 50:350]
+        ours, theirs = (plane + 0.001 * rng.standard_normal(plane.shape) for plane in planes)
+        whole, rest = _shift(theirs, ours)
+        np.testing.assert_allclose(whole + rest, -tiles, atol=0.3)
 
 
 @pytest.mark.parametrize("iso", [1600, 25600])

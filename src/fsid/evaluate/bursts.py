@@ -296,10 +296,11 @@ def _shift(ours: np.ndarray, theirs: np.ndarray) -> tuple[np.ndarray, np.ndarray
     near = np.roll(smooth_ours, tuple(whole), axis=(0, 1))
     a, b = ((plane - plane.mean()) * window for plane in (smooth, near))
     rest = phase_cross_correlation(a, b, upsample_factor=20, normalization=None)[0]
-    if np.abs(rest).max() > MAX_SUBPIXEL and not _lies_beside(
-        *(plane[_shown(whole)] for plane in (np.roll(ours, tuple(whole), axis=(0, 1)), theirs))
-    ):
-        rest = np.zeros(2)
+    if np.abs(rest).max() > MAX_SUBPIXEL:
+        seen, far = _shown(whole), np.round(rest).astype(int)
+        ours, theirs = np.roll(ours, tuple(whole), axis=(0, 1))[seen], theirs[seen]
+        if not (_lies_beside(ours, theirs) or (far.any() and _brings_nearer(far, ours, theirs))):
+            rest = np.zeros(2)
     return whole, rest
 
 
