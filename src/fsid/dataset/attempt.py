@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ import numpy as np
 from fsid import __version__
 from fsid.config import to_plain
 from fsid.dataset.checks import distance, fingerprint, flaw
-from fsid.dataset.config import GenerateConfig, split_of
+from fsid.dataset.config import Checks, GenerateConfig, split_of
 from fsid.dataset.pictures import find_pictures, read_picture
 from fsid.dataset.tasks import (
     SceneRenderer,
@@ -43,7 +43,7 @@ from fsid.sensor import (
 )
 
 _SCENE, _CROP, _EXPOSURE, _COLOUR, _NOISE, _TASK = range(6)
-_WINDOWS = 3
+_WINDOWS, _NOTHING = 3, 0.99
 Window = tuple[int, int, int, int]
 """Left, top, width, height in pixels of the truth."""
 
@@ -95,7 +95,7 @@ class Attempt:
         for crop in range(self.config.crops):
             window = self._window(views, crop)
             clean = [shot.clean(_cut(views.truth, window)) for shot in shots]
-            if wrong := next(filter(None, (flaw(raw, self.config.checks) for raw in clean)), None):
+            if wrong := next(filter(None, (flaw(raw, self._checks()) for raw in clean)), None):
                 return wrong
             looks.append(fingerprint(clean[0]))
             if not self.config.images and self._is_old(looks):
@@ -121,13 +121,18 @@ class Attempt:
         )
 
     def drawn_picture(self) -> tuple[int, Path]:
-        """The picture that this attempt takes, and its number in `config.images`.
-
-        One of which `_WINDOWS` windows were refused is black or blown all over, and the next ones are tried.
-        """
+        """The picture that this attempt takes, and its number in `config.images`."""
         paths = find_pictures(Path(self.config.images))
-        number = (self.frame + max(len(self.refused) - _WINDOWS + 1, 0)) % len(paths)
+        number = self.frame % len(paths)
         return number, paths[number]
+
+    def _checks(self) -> Checks:
+        """Those of the configuration; a picture with no better window is taken unless it shows nothing."""
+        checks = self.config.checks
+        if not self.config.images or len(self.refused) < _WINDOWS:
+            return checks
+        black, blown = (max(share, _NOTHING) for share in (checks.black_share, checks.blown_share))
+        return replace(checks, black_share=black, blown_share=blown)
 
     def _is_old(self, looks: list[str]) -> bool:
         near = self.config.checks.duplicate_bits

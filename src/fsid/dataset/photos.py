@@ -13,6 +13,7 @@ from fsid.errors import FsidError
 from fsid.sensor import upright
 
 SMALLEST_PX = 32
+_BLACK = 0.02
 _WITHOUT_ALPHA = {"P": "RGB", "PA": "RGB", "RGBA": "RGB", "RGBX": "RGB", "LA": "L", "1": "L"}
 PHOTO_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".bmp")
 
@@ -45,8 +46,14 @@ def read_photo(path: str | Path) -> np.ndarray:
 
 
 def check_photo(path: str | Path) -> None:
-    """FsidError where `read_photo` has one; a JPEG takes a quarter of its time, others little less."""
-    _read(path, shrink=8)
+    """FsidError where `read_photo` has one, and for a photograph that shows nothing.
+
+    A JPEG takes a quarter of the time of `read_photo`, others little less.
+    """
+    pixels = _read(path, shrink=8)
+    for colour, shows_nothing in (("black", pixels.max() < _BLACK), ("white", pixels.min() > 1 - _BLACK)):
+        if shows_nothing:
+            raise FsidError(f"{path}: is {colour} all over")
 
 
 def _read(path: str | Path, shrink: int = 1) -> np.ndarray:
