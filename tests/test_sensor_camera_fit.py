@@ -205,6 +205,13 @@ def test_no_frame_is_written_over(tmp_path, rng, capsys):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["frames", "p.yaml"]
 
 
+def test_a_frame_of_another_size_is_named(tmp_path, rng):
+    paths = write_burst(tmp_path / "frames", rng, scene(0.5, 64), 1600, 3)
+    larger = write_burst(tmp_path / "larger", rng, scene(0.5, 80), 1600, 3)
+    with pytest.raises(FsidError, match=r"larger/000\.dng of the burst is \(80, 80\)"):
+        calibrate([*paths, larger[0]], name="x")
+
+
 def test_the_name_of_a_camera_is_printed_as_it_is(tmp_path, rng, capsys):
     write_burst(tmp_path / "frames", rng, scene(0.5), 1600, 3)
     name, source = "mine [b] [/home/me]", "bench [red], [/lab/2]"

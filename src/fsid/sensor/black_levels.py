@@ -35,8 +35,9 @@ class BlackLevels:
         rows, columns = self.tile.shape
         for (r, c), level in np.ndenumerate(self.tile):
             x[r::rows, c::columns] -= np.float32((level - black) * unit)
-        x -= (self.of_row[: len(x), None] * unit).astype(np.float32)
-        x -= (self.of_column[: x.shape[1]] * unit).astype(np.float32)
+        of_row, of_column = self._deltas(x.shape)
+        x -= (of_row[:, None] * unit).astype(np.float32)
+        x -= (of_column * unit).astype(np.float32)
         return x
 
     def levelled(self, dn: np.ndarray, black: int, white: int) -> np.ndarray:
@@ -54,9 +55,20 @@ class BlackLevels:
         above = self._above(black, (height, width))
         return black + pack(above - np.rint(above), cfa).mean(axis=(1, 2), dtype=np.float64)
 
+    def fits(self, shape: tuple[int, ...]) -> bool:
+        """Whether an image of another size (H, W) has these levels, too."""
+        within = shape[0] <= len(self.of_row) and shape[1] <= len(self.of_column)
+        return within or not (self.of_row.any() or self.of_column.any())
+
+    def _deltas(self, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+        if self.of_row.any() or self.of_column.any():
+            return self.of_row[: shape[0]], self.of_column[: shape[1]]
+        return np.zeros(shape[0]), np.zeros(shape[1])
+
     def _above(self, black: int, shape: tuple[int, ...]) -> np.ndarray:
         rows, columns = (np.arange(side) % n for side, n in zip(shape, self.tile.shape, strict=True))
         above = (self.tile - black).astype(np.float32)[np.ix_(rows, columns)]
-        above += self.of_row[: len(rows), None]
-        above += self.of_column[: len(columns)]
+        of_row, of_column = self._deltas(shape)
+        above += of_row[:, None]
+        above += of_column
         return above

@@ -91,6 +91,8 @@ class FrameSet:
                 f"{frame.path}: CFA, black and white level are {found}, those of the first frame {expected}; "
                 f"give frames of one camera in one mode"
             )
+        if not camera.black.fits(stored.dn.shape):
+            raise FsidError(f"{frame.path}: is larger than the first frame, whose rows differ in black level")
         return camera.black.levelled(stored.dn, camera.black_level, camera.white_level)
 
 

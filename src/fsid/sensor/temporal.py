@@ -234,8 +234,9 @@ class TemporalStatistics:
         pixel = float(squares.mean())
         rows, columns = d.mean(axis=1), d.mean(axis=0)
         self._banding += rows.var() - pixel / width, columns.var() - pixel / height
-        for row, power in enumerate((squares, squares * squares)):
-            self._moments[row] += [power[site].mean() for site in TILE]
+        for moment in self._moments:
+            moment += [squares[site].mean() for site in TILE]
+            squares *= squares
 
 
 def _check_dn(dn: np.ndarray, name: str) -> None:
