@@ -36,8 +36,9 @@ from fsid.config import load_settings
 from fsid.dataset.loader import Batch, PatchConfig, PatchDataset
 from fsid.denoise.checkpoint import load_checkpoint
 from fsid.denoise.raw_denoiser import RawDenoiser
+from fsid.denoise.run_folder import CONFIG_FILE
 from fsid.denoise.stabilise import stabilise
-from fsid.denoise.train import CONFIG_FILE, noise_left
+from fsid.denoise.train import noise_left
 from fsid.denoise.train_config import TrainConfig
 from fsid.errors import FsidError
 

@@ -83,6 +83,11 @@ def stored(rng: np.random.Generator, number: int, size: int = 96) -> tuple[str, 
     return f"{number:08d}", {"clean.dng": buffer.getvalue()}
 
 
+def stop_at_five(done: int, steps: int) -> None:
+    if done == 5:
+        raise KeyboardInterrupt
+
+
 def test_the_loss_is_the_share_of_the_variance_of_the_noise_that_is_left() -> None:
     """A dark patch of a quiet camera, a bright one of a noisy camera; a fifth and all of the noise left."""
     k, sigma2 = torch.tensor([[1e-4] * 4, [1e-2] * 4]), torch.tensor([[1e-6] * 4, [1e-4] * 4])
@@ -217,12 +222,8 @@ def test_a_dataset_that_grew_is_judged_by_what_it_holds_out_now(
     write_shard(shard_path(folder, 0), samples[:5])
     config = replace(CONFIG, held_out=1, validate_every=4)
 
-    def stop(done: int, steps: int) -> None:
-        if done == 5:
-            raise KeyboardInterrupt
-
     with pytest.raises(KeyboardInterrupt):
-        train(folder, run, config, progress=stop)
+        train(folder, run, config, progress=stop_at_five)
     write_shard(shard_path(folder, 1), samples[5:])
     card = load_denoiser(train(folder, run, config, quiet=True)).card
     row = {"step": 8, "held_out": 1, "held_out_from": 9, "psnr_scenes": 40.0}
@@ -256,12 +257,8 @@ def test_a_run_of_before_there_were_sizes_draws_images_as_they_are(large: Path, 
     run = tmp_path / "run"
     whole = train(large, tmp_path / "whole", replace(CONFIG, shrink=(1,)), quiet=True)
 
-    def stop(done: int, steps: int) -> None:
-        if done == 5:
-            raise KeyboardInterrupt
-
     with pytest.raises(KeyboardInterrupt):
-        train(large, run, replace(CONFIG, shrink=(1,)), progress=stop)
+        train(large, run, replace(CONFIG, shrink=(1,)), progress=stop_at_five)
     file = run / "config.yaml"
     file.write_text("".join(line for line in file.read_text().splitlines(True) if "shrink" not in line))
     resumed = train(large, run, CONFIG, quiet=True)

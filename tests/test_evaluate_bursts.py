@@ -13,7 +13,8 @@ from scipy.ndimage import gaussian_filter, shift
 from fsid.cli.main import main
 from fsid.errors import FsidError
 from fsid.evaluate import NOISY, burst_testset, compare, psnr, read_testset, simulated_testset
-from fsid.evaluate.bursts import _shift, average
+from fsid.evaluate.bursts import average
+from fsid.evaluate.placing import shift_between
 from fsid.sensor import Raw, load_profile, noisy_from_clean, read_raw, write_dng
 from fsid.sensor.metadata import ORIENTATION, Metadata
 from fsid.sensor.tiff import SHORT, Tag
@@ -98,7 +99,7 @@ def test_a_far_move_over_a_smooth_texture_is_seen():
         tiles = rng.integers(6, 20, 2)
         planes = scene[50:350, 50:350], np.roll(scene, tiles, axis=(0, 1))[50:350, 50:350]
         ours, theirs = (plane + 0.001 * rng.standard_normal(plane.shape) for plane in planes)
-        whole, rest = _shift(theirs, ours)
+        whole, rest = shift_between(theirs, ours)
         np.testing.assert_allclose(whole + rest, -tiles, atol=0.3)
 
 

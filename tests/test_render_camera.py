@@ -15,7 +15,7 @@ from fsid.render.camera import lens_of
 from fsid.render.drawable import View
 from fsid.render.flow import flow_between
 from fsid.scene import SceneConfig, sample
-from fsid.scene.distortion import distorted, reach, undistorted
+from fsid.scene.distortion import distorted, fold_radius, undistorted
 from fsid.scene.model import Camera, Distortion, Motion, Transform
 from render_scenes import FROM_ABOVE, bake_plain, block, grid, lambertian, point_light, sphere, view
 
@@ -174,10 +174,10 @@ FOLDS = {
 
 @pytest.mark.parametrize("name", FOLDS)
 def test_a_lens_reaches_to_where_its_image_folds(name: str) -> None:
-    radius = reach(FOLDS[name]) * np.array([0.97, 0.98, 0.99, 1.01, 1.02, 1.03])
+    radius = fold_radius(FOLDS[name]) * np.array([0.97, 0.98, 0.99, 1.01, 1.02, 1.03])
     seen = distorted(FOLDS[name], np.stack([radius, 0 * radius], -1))[:, 0]
     assert (np.sign(np.diff(seen))[[0, 1, 3, 4]] == [1, 1, -1, -1]).all()
-    assert reach(BARREL) == reach(FISHEYE) == reach(None) == np.inf
+    assert fold_radius(BARREL) == fold_radius(FISHEYE) == fold_radius(None) == np.inf
 
 
 @pytest.mark.parametrize("name", FOLDS)

@@ -29,6 +29,7 @@ Override = str | tuple[str, Any]
 Layer = tuple[str, list[str], Any]
 """One setting: its source, the path of its key and its value."""
 _MOST_NODES = 1_000_000
+"""Values of a YAML text: aliases of aliases stand for more than any memory holds."""
 
 
 def _strict_int(value: Any, _: type) -> int:

@@ -43,7 +43,10 @@ from fsid.sensor import (
 )
 
 _SCENE, _CROP, _EXPOSURE, _COLOUR, _NOISE, _TASK = range(6)
-_WINDOWS, _NOTHING = 3, 0.99
+_WINDOWS = 3
+"""So many windows of a picture are judged as frames of scenes are."""
+_NOTHING = 0.99
+"""Share of black, or of blown, pixels of an image that shows nothing."""
 Window = tuple[int, int, int, int]
 """Left, top, width, height in pixels of the truth."""
 

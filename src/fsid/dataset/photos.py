@@ -13,7 +13,7 @@ from fsid.errors import FsidError
 from fsid.sensor import upright
 
 SMALLEST_PX = 32
-_BLACK = 0.02
+_BLACK = 0.02  # sRGB-encoded; a photograph that is darker everywhere shows nothing
 _WITHOUT_ALPHA = {"P": "RGB", "PA": "RGB", "RGBA": "RGB", "RGBX": "RGB", "LA": "L", "1": "L"}
 PHOTO_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".bmp")
 

@@ -24,12 +24,13 @@ import numpy as np
 
 from fsid.denoise.model import ModelCard
 from fsid.errors import FsidError
+from fsid.sensor.light import GREY
 from fsid.sensor.mosaic import pack, site_offsets, unpack
 from fsid.sensor.raw import NoiseLevel, Raw
 
 MAX_STRENGTH = 100.0
 MAX_TOLD = 0.0036
-"""Variance at mid-grey, 0.18, up to which a network is told of more noise than there is: k of 0.02. Beyond
+"""Variance at mid-grey up to which a network is told of more noise than there is: k of 0.02. Beyond
 what it was trained on it loses the colours; up to here the one that ships keeps them to 3 %."""
 TILE_PX = 512  # packed pixels: some 500 MB of activations for the small networks
 _POOLING_PATCHES = 16
@@ -96,7 +97,7 @@ def denoise_raw(
 
 def _stronger(level: NoiseLevel, times: float) -> NoiseLevel:
     """Of so many times the variance, or as many as `MAX_TOLD` allows."""
-    at_grey = max(0.18 * k + sigma2 for k, sigma2 in zip(level.k, level.sigma2, strict=True))
+    at_grey = max(GREY * k + sigma2 for k, sigma2 in zip(level.k, level.sigma2, strict=True))
     times = min(times, max(MAX_TOLD / max(at_grey, 1e-12), 1.0))
     return NoiseLevel(_times(level.k, times), _times(level.sigma2, times))
 

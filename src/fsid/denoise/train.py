@@ -27,16 +27,17 @@ from rich.console import Console
 from rich.text import Text
 from torch import Tensor
 
-from fsid.config import as_read, load_settings, read_yaml, save_settings, to_plain
+from fsid.config import as_read, read_yaml, to_plain
 from fsid.dataset.feed import batches
 from fsid.dataset.index import identity, index_mosaics
 from fsid.dataset.loader import Batch, PatchConfig, PatchDataset
 from fsid.denoise.board import Board
 from fsid.denoise.checkpoint import TrainState, load_checkpoint, save_checkpoint
-from fsid.denoise.initial import drop_initial, has_network, initial_network, keep_initial
+from fsid.denoise.initial import initial_network
 from fsid.denoise.live import LiveLine
 from fsid.denoise.model import MODEL_FILE, Denoiser, ModelCard, save_model
 from fsid.denoise.raw_denoiser import RawDenoiser
+from fsid.denoise.run_folder import CONFIG_FILE, prepare_run, sizes_as_begun
 from fsid.denoise.sessions import Session, read_sessions
 from fsid.denoise.stabilise import stabilise
 from fsid.denoise.train_config import TrainConfig
@@ -44,7 +45,6 @@ from fsid.denoise.validate import held_out, validation
 from fsid.errors import FsidError
 from fsid.files import held, write_atomically
 
-CONFIG_FILE = "config.yaml"
 HISTORY_FILE, VALIDATION_FILE = "history.json", "validation.json"
 LAST_FILE = "last.safetensors"  # beside the best network, `MODEL_FILE`
 SELECTED = "psnr_scenes"  # which validation chooses the best network
@@ -82,7 +82,7 @@ def train(
     diverges. PyTorch's number of threads and its random numbers on the CPU are afterwards what they were.
     """
     data_dir, run_dir = Path(data_dir), Path(run_dir)
-    config = _sizes_as_begun(run_dir, as_read(config, source="config"))
+    config = sizes_as_begun(run_dir, as_read(config, source="config"))
     if config.threads:
         torch.set_num_threads(config.threads)
     gpu = torch.cuda.is_available()
@@ -99,7 +99,7 @@ def train(
         _note_nothing_held_out(data_dir)
     with held(run_dir, "another fsid train is at work in it") if is_main else nullcontext():
         with accelerator.main_process_first():
-            _prepare_run(data_dir, run_dir, config, initial)
+            prepare_run(data_dir, run_dir, config, initial)
         torch.manual_seed(config.seed)
         net, optimizer = _prepare(accelerator, config, initial)
         bare = accelerator.unwrap_model(net)
@@ -210,8 +210,7 @@ def _card(data_dir: Path, config: TrainConfig, images: int, initial: Denoiser | 
     """The card of the network to come, without results."""
     file = data_dir / CONFIG_FILE
     training = f"{images} images of {data_dir.resolve().name}"
-    data = read_yaml(file) if file.is_file() else {}
-    details = {"config": to_plain(config), "data": data}
+    details = {"config": to_plain(config), "data": read_yaml(file) if file.is_file() else {}}
     if initial is not None:
         training += f" after {initial.card.training}"
         details["initial"] = to_plain(initial.card)
@@ -250,48 +249,6 @@ def noise_left(estimate: Tensor, clean: Tensor, k: Tensor, sigma2: Tensor) -> Te
 def mean_psnr(estimate: Tensor, clean: Tensor) -> Tensor:
     """Mean over the patches of (B, 4, h, w) of their PSNR in dB, data range 1, linear RAW."""
     return -10 * torch.log10((estimate - clean).square().mean((1, 2, 3)) + 1e-12).mean()
-
-
-def _sizes_as_begun(run_dir: Path, config: TrainConfig) -> TrainConfig:
-    """`config`, with the sizes of images that the run in `run_dir` was begun with where it names none."""
-    file = run_dir / CONFIG_FILE
-    if config.shrink or not (file.is_file() and has_network(run_dir)):
-        return config
-    return replace(config, shrink=_begun_with(file).shrink)
-
-
-def _begun_with(file: Path) -> TrainConfig:
-    """The settings in the file of a run; before there was `shrink`, images were drawn as they are."""
-    there = load_settings(TrainConfig, file)
-    return there if "shrink" in read_yaml(file) else replace(there, shrink=(1,))
-
-
-def _prepare_run(data_dir: Path, run_dir: Path, config: TrainConfig, initial: Denoiser | None) -> None:
-    """`run_dir` is of `config` and data, whatever a run that failed before its first network left there."""
-    file = run_dir / CONFIG_FILE
-    there = _begun_with(file) if file.is_file() else None
-    if there is not None and has_network(run_dir):
-        old, new = to_plain(there), to_plain(config)
-        if changed := [key for key in new if new[key] != old[key]]:
-            raise FsidError(
-                f"{file}: this run was started with another {', '.join(changed)}; "
-                "continue it with its own settings or give another folder"
-            )
-        data = identity(data_dir)
-        if any(row.get("data", data) != data for row in read_sessions(run_dir)):
-            raise FsidError(
-                f"{run_dir}: this run was started on other data than {data_dir}; "
-                "continue it with its own dataset or give another folder"
-            )
-        return
-    try:
-        run_dir.mkdir(parents=True, exist_ok=True)
-        drop_initial(run_dir)  # first: it may be of other settings
-        save_settings(config, file)
-        if initial is not None:
-            keep_initial(run_dir, initial)
-    except OSError as error:
-        raise FsidError(f"{run_dir}: cannot be written ({error.strerror})") from None
 
 
 def _note_nothing_held_out(data_dir: Path) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 from fsid.render.camera import Lens
 from fsid.render.drawable import UNMOVED, Drawable
 from fsid.render.frame import Frame
-from fsid.scene.distortion import distorted, reach, undistorted
+from fsid.scene.distortion import distorted, fold_radius, undistorted
 from fsid.scene.model import Camera
 
 
@@ -49,7 +49,7 @@ def flow_between(
     hit &= local[..., 2] > 1e-6
     ahead = np.where(hit, local[..., 2], 1.0)
     image = np.stack([local[..., 0] / ahead, -local[..., 1] / ahead], axis=-1)
-    hit &= np.linalg.norm(image, axis=-1) < reach(other.distortion)
+    hit &= np.linalg.norm(image, axis=-1) < fold_radius(other.distortion)
     half = np.array([other.width, other.height]) / 2
     moved = (distorted(other.distortion, image) * other_lens.focal + 1) * half
     return np.where(hit[..., None], moved - seen, np.nan).astype(np.float32)

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fsid.scene.check import LIGHT_KINDS
 from fsid.scene.model import Light
 
 BORDER = 0.17
@@ -21,7 +22,7 @@ BORDER = 0.17
 
 NEAR_M = 0.02
 COLUMNS = 6
-KINDS = {"point": 0, "spot": 0, "sun": 1, "area": 2}
+KINDS = dict(zip(LIGHT_KINDS, (0, 0, 1, 2), strict=True))
 _WIDEST_SPOT_DEG = 120.0
 _WIDEST_BORDER = 0.7
 

@@ -40,7 +40,7 @@ def distorted(distortion: Distortion | None, points: np.ndarray) -> np.ndarray:
     )
 
 
-def reach(distortion: Distortion | None) -> float:
+def fold_radius(distortion: Distortion | None) -> float:
     """Pinhole radius up to which the distorted one grows; what lies beyond the polynomial folds back."""
     if distortion is None:
         return float("inf")

@@ -103,8 +103,8 @@ def read_raw(path: str | Path) -> Raw:
     Black levels that differ between sites (in a DNG in any pattern, between rows and columns too, and by
     fractions of a DN) are subtracted each; `black_level` is their rounded mean. Unknown colour becomes the
     mean of the published matrices, unknown white balance (1, 1, 1), unknown ISO 0.
-    FsidError: missing, truncated, zeros in place of pixels, no RAW, not Bayer (X-Trans, Foveon, linear DNG,
-    monochrome), floating point.
+    FsidError: missing, truncated, zeros in place of pixels, no RAW, a bare mosaic, not Bayer (X-Trans,
+    Foveon, linear DNG, monochrome), floating point.
     """
     path = Path(path)
     with _opened(path) as (file, source):

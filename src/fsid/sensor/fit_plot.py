@@ -40,7 +40,7 @@ def check_picture(path: Path, beside: Path | None = None) -> None:
     check_output(path)
 
 
-def check_profile(path: Path, frames: Collection[Path] = (), plot: Path | None = None) -> None:
+def check_profile(path: Path, frames: Collection[Path], plot: Path | None) -> None:
     """FsidError unless a profile can be written to `path`, a picture to `plot`, and neither is of `frames`.
 
     Profiles are .yaml: a shell puts the first frame after an -o that was left without a name.

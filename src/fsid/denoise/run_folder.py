@@ -1,0 +1,58 @@
+"""The folder of a training: whose it is, and what it was begun with."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from fsid.config import load_settings, read_yaml, save_settings, to_plain
+from fsid.dataset.index import identity
+from fsid.denoise.initial import drop_initial, has_network, keep_initial
+from fsid.denoise.model import Denoiser
+from fsid.denoise.sessions import read_sessions
+from fsid.denoise.train_config import TrainConfig
+from fsid.errors import FsidError
+
+CONFIG_FILE = "config.yaml"
+
+
+def sizes_as_begun(run_dir: Path, config: TrainConfig) -> TrainConfig:
+    """`config`, with the sizes of images that the run in `run_dir` was begun with where it names none."""
+    file = run_dir / CONFIG_FILE
+    if config.shrink or not (file.is_file() and has_network(run_dir)):
+        return config
+    return replace(config, shrink=_begun_with(file).shrink)
+
+
+def _begun_with(file: Path) -> TrainConfig:
+    """The settings in the file of a run; before there was `shrink`, images were drawn as they are."""
+    there = load_settings(TrainConfig, file)
+    return there if "shrink" in read_yaml(file) else replace(there, shrink=(1,))
+
+
+def prepare_run(data_dir: Path, run_dir: Path, config: TrainConfig, initial: Denoiser | None) -> None:
+    """`run_dir` is of `config` and data, whatever a run that failed before its first network left there."""
+    file = run_dir / CONFIG_FILE
+    there = _begun_with(file) if file.is_file() else None
+    if there is not None and has_network(run_dir):
+        old, new = to_plain(there), to_plain(config)
+        if changed := [key for key in new if new[key] != old[key]]:
+            raise FsidError(
+                f"{file}: this run was started with another {', '.join(changed)}; "
+                "continue it with its own settings or give another folder"
+            )
+        data = identity(data_dir)
+        if any(row.get("data", data) != data for row in read_sessions(run_dir)):
+            raise FsidError(
+                f"{run_dir}: this run was started on other data than {data_dir}; "
+                "continue it with its own dataset or give another folder"
+            )
+        return
+    try:
+        run_dir.mkdir(parents=True, exist_ok=True)
+        drop_initial(run_dir)  # first: it may be of other settings
+        save_settings(config, file)
+        if initial is not None:
+            keep_initial(run_dir, initial)
+    except OSError as error:
+        raise FsidError(f"{run_dir}: cannot be written ({error.strerror})") from None

@@ -1,0 +1,169 @@
+"""How the frames of a burst lie on its first one, and what keeps them out of its truth.
+
+A frame that moved by a whole number of CFA tiles can be put back. A shift that the noise of two frames
+explains is none: on smooth scenes the estimate wanders by tiles, and the less a shift shows the less it does
+to the truth.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.ndimage import uniform_filter
+from skimage.registration import phase_cross_correlation
+
+from fsid.errors import FsidError
+from fsid.sensor import Raw, pack, read_raw
+
+MAX_FLICKER = 0.2
+"""A frame whose brightness differs by more from the first is left out."""
+MAX_SUBPIXEL = 0.15
+"""Largest rest of a shift, in CFA tiles, that a frame of the truth may have."""
+MAX_SHIFT_TILES = 32
+MAX_SHIFT_SHARE = 1 / 8
+"""Largest shift, in edges of the image."""
+SIGNIFICANT = 5.0
+"""Standard errors by which a shift must show."""
+LEAST_LIGHT_DN = 0.5
+"""Mean signal of the first frame, below which brightness is that of the black level."""
+MOST_SATURATED = 0.5
+"""Share of the first frame that may be at white."""
+LEAST_FRAMES = 3
+_FLICKERED = f"differ from the first in brightness by more than {100 * MAX_FLICKER:.0f} %"
+_MOVED = "moved by a part of a CFA tile, or too far"
+_ADVICE = {_FLICKERED: "Lock the exposure and use a lamp that does not flicker", _MOVED: "Use a tripod"}
+_NEARLY_ALL = 0.8  # of the frames that are left out
+
+
+Window = tuple[slice, slice]
+
+
+@dataclass(frozen=True)
+class Placed:
+    """Where a frame goes: roll by (rows, columns) pixels, then divide by the gain.
+
+    fault: what keeps it out of the truth, or "". rest: rows and columns, in tiles, that rolling leaves.
+    """
+
+    path: Path
+    roll: tuple[int, int]
+    gain: float
+    fault: str = ""
+    rest: tuple[float, float] = (0.0, 0.0)
+
+
+def read_first(path: Path) -> Raw:
+    """The first frame of a burst, with which all others are compared; FsidError where it shows no picture."""
+    first = read_raw(path)
+    span = first.white_level - first.black_level
+    if _green(first).mean() * span < LEAST_LIGHT_DN:
+        raise FsidError(f"{path}: shows no light, the first frame of its burst; expose longer, or remove it")
+    if (share := float(np.mean(first.mosaic >= 1 - 0.5 / span))) > MOST_SATURATED:
+        raise FsidError(
+            f"{path}: {100 * share:.0f} % of the first frame of its burst are saturated; expose shorter"
+        )
+    return first
+
+
+def too_few(reference: Path, placed: Sequence[Placed]) -> FsidError:
+    """What keeps so many frames of a burst out of its truth."""
+    left_out = [p for p in placed if p.fault]
+    faults = Counter(p.fault for p in left_out)
+    if len(left_out) >= LEAST_FRAMES and _are_alike(left_out):
+        return FsidError(
+            f"{reference}: {len(left_out)} of the {len(placed)} other frames of its burst "
+            f"{faults.most_common()[0][0]}, and are alike; remove this first frame"
+        )
+    reasons = "".join(f"; {number} {fault}" for fault, number in faults.most_common())
+    advice = "".join(f". {_ADVICE[fault]}" for fault, _ in faults.most_common())
+    return FsidError(
+        f"{reference.parent}: only {len(placed) - len(left_out)} of {len(placed)} frames lie still and have "
+        f"steady light, at least {LEAST_FRAMES} are needed{reasons}{advice}"
+    )
+
+
+def _are_alike(frames: Sequence[Placed]) -> bool:
+    """Whether nearly all of these lie on each other in the same light."""
+    light = np.array([p.gain for p in frames]) / np.median([p.gain for p in frames])
+    place = np.array([np.add(np.divide(p.roll, 2), p.rest) for p in frames])
+    still = np.abs(place - np.median(place, axis=0)).max(axis=1) <= MAX_SUBPIXEL
+    return bool(np.mean(still & (np.abs(light - 1) <= MAX_FLICKER)) >= _NEARLY_ALL)
+
+
+def place(path: Path, first: Raw) -> Placed:
+    """How a frame lies on the first, which has light, and whether it moved or flickered too much."""
+    raw = read_raw(path)
+    if raw.mosaic.shape != first.mosaic.shape or raw.cfa != first.cfa:
+        raise FsidError(f"{path}: size or CFA differs from the other frames of the burst")
+    if raw.iso != first.iso:
+        raise FsidError(f"{path}: ISO {raw.iso:g} differs from ISO {first.iso:g} of the burst's first frame")
+    ours, theirs = (_green(r) for r in (raw, first))
+    gain = float(ours.sum() / theirs.sum())
+    if not abs(gain - 1) <= MAX_FLICKER:
+        return Placed(path, (0, 0), gain, _FLICKERED)
+    whole, rest = shift_between(ours / gain, theirs)
+    most = min(MAX_SHIFT_TILES, MAX_SHIFT_SHARE * min(ours.shape))
+    moved = np.abs(rest).max() > MAX_SUBPIXEL or np.abs(whole).max() > most
+    roll = 2 * int(whole[0]), 2 * int(whole[1])
+    return Placed(path, roll, gain, _MOVED if moved else "", (float(rest[0]), float(rest[1])))
+
+
+def shift_between(ours: np.ndarray, theirs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rows and columns that `ours` must be rolled by, in tiles: whole ones, and what is left then.
+
+    Phase correlation finds the whole shift among many; the peak of the plain, windowed correlation then tells
+    the rest, which the phases of pure noise would blur. 0 where noise explains what is found.
+    """
+    window = np.hanning(ours.shape[0])[:, None] * np.hanning(ours.shape[1])
+    smooth_ours, smooth = uniform_filter(ours, 3), uniform_filter(theirs, 3)
+    whole = np.round(phase_cross_correlation(smooth, smooth_ours)[0]).astype(int)
+    if not _brings_nearer(whole, ours, theirs):
+        whole = np.zeros(2, int)
+    near = np.roll(smooth_ours, tuple(whole), axis=(0, 1))
+    a, b = ((plane - plane.mean()) * window for plane in (smooth, near))
+    rest = phase_cross_correlation(a, b, upsample_factor=20, normalization=None)[0]
+    if np.abs(rest).max() > MAX_SUBPIXEL:
+        seen, far = _shown(whole), np.round(rest).astype(int)
+        ours, theirs = np.roll(ours, tuple(whole), axis=(0, 1))[seen], theirs[seen]
+        if not (_lies_beside(ours, theirs) or (far.any() and _brings_nearer(far, ours, theirs))):
+            rest = np.zeros(2)
+    return whole, rest
+
+
+def _shown(whole: np.ndarray) -> Window:
+    """What a plane still shows of its scene when it is rolled by `whole` rows and columns."""
+    rows, columns = (slice(max(n, 0), min(n, 0) or None) for n in whole)
+    return rows, columns
+
+
+def _brings_nearer(whole: np.ndarray, ours: np.ndarray, theirs: np.ndarray) -> bool:
+    """Whether `ours` rolled by `whole` differs less from `theirs` than it does in place, beyond noise."""
+    seen = _shown(whole)
+    rolled = np.roll(ours, tuple(whole), axis=(0, 1))
+    gained = ((ours - theirs) ** 2 - (rolled - theirs) ** 2)[seen]
+    return bool(gained.mean() > SIGNIFICANT * gained.std() / np.sqrt(gained.size))
+
+
+def _lies_beside(ours: np.ndarray, theirs: np.ndarray) -> bool:
+    """Whether a small shift explains, beyond noise, how two planes (h, w) of equal light differ.
+
+    ours - theirs = -shift . gradient + noise: the correlation with the gradient, less what of it looks like
+    another light, has the error that the differences themselves tell (White 1980).
+    """
+    smooth = uniform_filter(theirs.astype(np.float64), 3)
+    slopes = np.stack([slope.ravel() for slope in np.gradient(smooth)], axis=1)
+    light = np.stack([np.ones(smooth.size), smooth.ravel()], axis=1)
+    slopes -= light @ np.linalg.lstsq(light, slopes, rcond=None)[0]
+    scores = slopes * (ours - theirs).reshape(-1, 1)
+    total = scores.sum(axis=0)
+    return bool(total @ np.linalg.pinv(scores.T @ scores) @ total > SIGNIFICANT**2)
+
+
+def _green(raw: Raw) -> np.ndarray:
+    """(H/2, W/2) mean of the greens."""
+    packed = pack(raw.mosaic, raw.cfa)
+    return (packed[1] + packed[2]) / 2
