@@ -24,6 +24,7 @@ from fsid.denoise.preview import PREVIEW_PX, preview_of  # noqa: E402
 from fsid.errors import FsidError  # noqa: E402
 from fsid.sensor import (  # noqa: E402
     Layout,
+    NoiseLevel,
     Raw,
     develop,
     load_profile,
@@ -173,6 +174,24 @@ def test_a_folder_is_done_file_by_file(
     assert "overwritten" in told
     assert "0.nef" not in told
     assert {path: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def test_noise_beyond_networks_is_said(
+    tmp_path: Path, network: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "in"
+    folder.mkdir()
+    for name, k in (("a", 0.01), ("b", 0.03), ("c", 0.05)):
+        strong = NoiseLevel((k, k, k, k), (1e-5, 1e-5, 1e-5, 1e-5))
+        write_dng(folder / f"{name}.dng", replace(noisy_raw(), noise=strong))
+    main(["denoise", str(folder), str(tmp_path / "out"), "--model", str(network)])
+    assert "b.dng and 1 more: more noise than networks" in capsys.readouterr().err
+    for name, told in (("a", False), ("c", True)):
+        command = ["denoise", str(folder / f"{name}.dng"), str(tmp_path / "one.dng"), "--model", str(network)]
+        main(command)
+        assert ("c.dng: more noise than networks" in capsys.readouterr().err) == told
+        main([*command, "--quiet"])
+        assert capsys.readouterr().err == ""
 
 
 def test_an_unreadable_file_is_left_out_of_a_folder(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -16,6 +16,7 @@ from fsid.cli.progress import progress_bar
 from fsid.errors import FsidError
 
 if TYPE_CHECKING:
+    from fsid.denoise import Noise
     from fsid.sensor import Layout
 
 
@@ -79,7 +80,7 @@ def denoise(
         if not quiet:
             _note_left_out(input, output, bare=layout is not None)
         with progress_bar("denoising", "files", quiet=quiet) as progress:
-            denoise_folder(
+            noises = denoise_folder(
                 sources,
                 output,
                 network,
@@ -90,6 +91,7 @@ def denoise(
                 progress=progress,
                 failed=lambda error: console.print(Text(f"fsid: {error}", style="bold red"), soft_wrap=True),
             )
+        _note_strong(noises, quiet=quiet)
         return
     with progress_bar("denoising", "tiles", quiet=quiet) as progress:
         noise = denoise_file(
@@ -106,6 +108,20 @@ def denoise(
         k, sigma2 = (sum(values) / 4 for values in (noise.level.k, noise.level.sigma2))
         line = f"noise: {noise.source}, k = {k:.3g}, sigma2 = {sigma2:.3g}"
         console.print(Text(line), soft_wrap=True)
+    _note_strong({input: noise}, quiet=quiet)
+
+
+def _note_strong(noises: Mapping[Path, Noise], *, quiet: bool) -> None:
+    """A line on the files that hold more noise than networks keep colours in."""
+    from fsid.denoise.denoise import MAX_TOLD, is_beyond_networks
+
+    if strong := [path for path, noise in noises.items() if is_beyond_networks(noise.level)]:
+        others = f" and {len(strong) - 1} more" if len(strong) > 1 else ""
+        line = (
+            f"note: {strong[0]}{others}: more noise than networks keep all colours in "
+            f"(variance at mid-grey above {MAX_TOLD:g}); look at the result"
+        )
+        Console(stderr=True, quiet=quiet).print(Text(line), soft_wrap=True)
 
 
 def _note_left_out(folder: Path, output: Path, *, bare: bool) -> None:

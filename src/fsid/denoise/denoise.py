@@ -95,10 +95,18 @@ def denoise_raw(
     return replace(raw, mosaic=mosaic, noise=None)
 
 
+def is_beyond_networks(level: NoiseLevel) -> bool:
+    """Whether it is more noise than `MAX_TOLD`, of which a network may lose colours."""
+    return _at_grey(level) > MAX_TOLD
+
+
+def _at_grey(level: NoiseLevel) -> float:
+    return max(GREY * k + sigma2 for k, sigma2 in zip(level.k, level.sigma2, strict=True))
+
+
 def _stronger(level: NoiseLevel, times: float) -> NoiseLevel:
     """Of so many times the variance, or as many as `MAX_TOLD` allows."""
-    at_grey = max(GREY * k + sigma2 for k, sigma2 in zip(level.k, level.sigma2, strict=True))
-    times = min(times, max(MAX_TOLD / max(at_grey, 1e-12), 1.0))
+    times = min(times, max(MAX_TOLD / max(_at_grey(level), 1e-12), 1.0))
     return NoiseLevel(_times(level.k, times), _times(level.sigma2, times))
 
 

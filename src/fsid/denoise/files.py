@@ -178,11 +178,11 @@ def denoise_folder(
     layout: Layout | None = None,
     progress: Callable[[int, int], None] | None = None,
     failed: Callable[[FsidError], None] = lambda error: None,
-) -> None:
+) -> dict[Path, Noise]:
     """Denoise each of `sources` into a DNG of its name in the folder `target`, which is made.
 
-    failed: told of each file that cannot be denoised; FsidError says in the end how many they were. What is
-    wrong with all of them `check_options` tells before.
+    The noise level that was used for each is returned. failed: told of each file that cannot be denoised;
+    FsidError says in the end how many they were. What is wrong with all of them `check_options` tells before.
     """
     target, paths = Path(target), list(map(Path, sources))
     names = [path.stem for path in paths]
@@ -196,17 +196,19 @@ def denoise_folder(
         target.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise FsidError(f"{target}: cannot be written ({error.strerror})") from None
-    failures = 0
+    noises: dict[Path, Noise] = {}
     for done, (source, out) in enumerate(zip(paths, targets, strict=True)):
         try:
-            denoise_file(source, out, model, profile=profile, iso=iso, strength=strength, layout=layout)
+            noises[source] = denoise_file(
+                source, out, model, profile=profile, iso=iso, strength=strength, layout=layout
+            )
         except FsidError as error:
-            failures += 1
             failed(error)
         if progress is not None:
             progress(done + 1, len(paths))
-    if failures:
+    if failures := len(paths) - len(noises):
         if is_new and failures == len(paths):
             with contextlib.suppress(OSError):  # something else came to lie in it
                 target.rmdir()
         raise FsidError(f"{failures} of {len(paths)} files could not be denoised")
+    return noises
