@@ -7,7 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import binary_erosion
 
+from fsid.assets import Mesh
 from fsid.render import Frame, Renderer
 from fsid.render.drawable import Drawable, View, background_drawable
 from fsid.scene.model import Background, Camera, Light, Transform
@@ -135,6 +137,45 @@ def test_no_acne_on_slopes_and_curves(renderer: Renderer) -> None:
     inner &= CENTRE < 19
     expected = 0.5 / np.pi * cosine / r**2
     np.testing.assert_allclose(frame.radiance[inner, 0], expected[inner], rtol=0.02)
+
+
+def dish(size_m: float, depth_m: float) -> Mesh:
+    """A shallow bowl on z = 0 that looks up, a paraboloid."""
+    flat = grid(size_m, 120)
+    x, y, _ = flat.vertices.T
+    steep = 4 * depth_m / size_m**2
+    normals = np.stack([-2 * steep * x, -2 * steep * y, np.ones_like(x)], axis=-1)
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    vertices = np.stack([x, y, steep * (x * x + y * y)], axis=-1)
+    return replace(flat, vertices=vertices.astype(np.float32), normals=normals.astype(np.float32))
+
+
+def test_wide_ground_takes_no_digits_from_the_sun_s_shadows(renderer: Renderer) -> None:
+    """A bowl in soft sunlight is as bright as Lambert says, on ground that reaches to the horizon."""
+    sun = Light("sun", (0.0, 0.0, 0.0), (0.5, 0.1, -0.5), (2.0, 2.0, 2.0), 0.02, 360.0)
+    to_sun = -np.array(sun.direction) / np.linalg.norm(sun.direction)
+    ground = replace(lambertian(grid(500.0), at=Transform((0.0, 0.0, -3.0), NO_TURN, ONE)), casts=False)
+    bowl = lambertian(dish(1.0, 0.1), object_id=1)
+    distant = lambertian(sphere(0.5), at=Transform((-14.0, 3.0, 0.0), NO_TURN, ONE), object_id=2)
+    camera = replace(FROM_ABOVE, fov_deg=20.0)
+    frame = draw(renderer, view(ground, bowl, distant, lights=(sun,), camera=camera))
+    inner = binary_erosion(frame.object_id == 1, iterations=2)
+    assert inner.mean() > 0.3
+    lambert = 2 * 0.5 / np.pi * frame.normal[inner] @ to_sun  # from above, camera space is the world's
+    np.testing.assert_allclose(frame.radiance[inner, 0], lambert, rtol=0.03)
+
+
+def test_ground_far_behind_all_that_shades_it_has_its_shadow(renderer: Renderer) -> None:
+    """The sun's map ends with the last of what casts shadows; what lies beyond is shaded no less."""
+    sun = Light("sun", (0.0, 0.0, 0.0), (0.6, 0.0, -0.8), (2.0, 2.0, 2.0), 0.0047, 360.0)
+    ball = lambertian(sphere(0.1), at=Transform((-0.9, 0.0, 1.2), NO_TURN, ONE), object_id=1)
+    ground = replace(lambertian(grid(300.0)), casts=False)
+    frame = draw(renderer, view(ground, ball, lights=(sun,)))
+    points, lit = floor_points(FROM_ABOVE), 2 * 0.5 / np.pi * 0.8
+    from_centre = np.hypot((points[..., 0]) * 0.8, points[..., 1])  # the shadow is an ellipse, 1 / 0.8 long
+    floor = frame.object_id == 0
+    assert (frame.radiance[floor & (from_centre < 0.06), 0] < 0.02 * lit).all()
+    np.testing.assert_allclose(frame.radiance[floor & (from_centre > 0.16), 0], lit, rtol=2e-3)
 
 
 def sphere_hits(camera: Camera, radius_m: float, sample: float = 0.5) -> tuple[np.ndarray, np.ndarray]:

@@ -21,6 +21,8 @@ from fsid.render.shadows import NEAR_M, ShadowPlan, Tile
 from fsid.render.stage import Stage
 from fsid.render.targets import Targets
 
+SUN_MIDDLE = 0.5  # as in shaders/shadows.glsl
+
 
 class ShadowPass:
     """Owns the atlas. taps: the texture of `fsid.render.quality.tap_table`. grid, compute: as in `Targets`.
@@ -76,6 +78,7 @@ class ShadowPass:
         self._context.enable_only(moderngl.NOTHING)
         canvas, half = self._atlas.begin_moments(), stage.plan.tile_px // 2
         for tile in seen:
+            self._moments.set(middle=SUN_MIDDLE if tile.range_m > 0 else 0.0)
             self._moments.draw(canvas, (tile.corner[0] // 2, tile.corner[1] // 2, half, half))
         self._atlas.end_moments()
 

@@ -151,14 +151,17 @@ def _fields(light: Light, casters: np.ndarray, scene: np.ndarray) -> list[_Field
 
 
 def _sun_field(light: Light, casters: np.ndarray, scene: np.ndarray) -> _Field:
-    """A square along the sun's rays around all that casts shadows, deep enough for the whole scene."""
+    """A square along the sun's rays around all that casts shadows, and as deep.
+
+    What lies beyond is in no need of depth of its own, and a range of that of wide ground would leave the
+    moments of the casters no digits.
+    """
     axes = _axes_along(np.array(light.direction))
     inside = casters if len(casters) else scene
     local = inside[:, :3] @ axes.T
     low, high = (local - inside[:, 3:]).min(0), (local + inside[:, 3:]).max(0)
-    deepest = (scene[:, :3] @ axes[2] + scene[:, 3]).max()
     origin = np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2] - 0.01]) @ axes
-    return _Field(origin, axes, float((high - low)[:2].max() / 2), float(deepest - low[2] + 0.02))
+    return _Field(origin, axes, float((high - low)[:2].max() / 2), float(high[2] - low[2] + 0.02))
 
 
 def _border(light: Light, fields: Sequence[_Field]) -> float:

@@ -7,6 +7,7 @@ uniform int filter_taps;
 uniform float tile_px;
 
 const float SHADOW_NEAR = 0.02;
+const float SUN_MIDDLE = 0.5;    // as in fsid.render.shadow_pass
 const float BIAS_M = 0.0015;
 const float SHARP_TEXELS = 3.0, SOFT_TEXELS = 8.0;   // radius of the penumbra: below, above, blended between
 const float LEAK = 0.1;          // share of light that overlapping occluders let through, cut off
@@ -15,13 +16,14 @@ const float DARK = 0.98;         // share of the search that is blocked where no
 const float TRACE = 1e-4, BEGUN = 0.003;   // taps of the search blocked: below no shadow, above all of it
 const int TILE_COLUMNS = 6;
 
-// Where a receiver is in its tile. u = 1 - window depth is near / z (of the sun: 1 - z / range), which is
-// linear over the tile for every plane.
+// Where a receiver is in its tile. u = 1 - window depth - middle is near / z (of the sun: 1/2 - z / range), which
+// is linear over the tile for every plane.
 struct Receiver {
     vec2 corner, centre;   // of the tile and of the receiver, 0..1 of the atlas
     vec2 to_atlas;         // tile units to 0..1 of the atlas
     vec2 slope;            // of u of the plane, per tile unit
     float u;
+    float middle, farthest;   // what is taken off u; u where nothing is, which is nearer than what lies beyond
     float bias;            // of u
     float texel, tile_size;   // of the depth; tile units
     mat2 spread;           // how far the light's half axes move a shadow, per difference of u; tile units
@@ -48,7 +50,9 @@ Receiver receiver_of(Light light, vec3 d, vec3 n) {
     vec2 at = sun ? q.xy : q.xy / q.z;
     float facing = sun ? m.z : dot(m, q);
     float toward = (facing < 0.0 ? -1.0 : 1.0) / max(abs(facing), 1e-6);
-    r.u = sun ? 1.0 - q.z / light.range_m : SHADOW_NEAR / q.z;
+    r.middle = sun ? SUN_MIDDLE : 0.0;
+    r.farthest = -r.middle;
+    r.u = sun ? 1.0 - q.z / light.range_m - r.middle : SHADOW_NEAR / q.z;
     r.slope = m.xy * toward * (sun ? 1.0 / light.range_m : SHADOW_NEAR);
     float steep = sun ? STEEPEST / light.range_m : STEEPEST * r.u;
     r.slope *= min(1.0, steep / max(length(r.slope), 1e-12));
@@ -64,7 +68,7 @@ Receiver receiver_of(Light light, vec3 d, vec3 n) {
     bool area = light.kind == AREA;
     r.spread = area ? per_u * mat2(w.xy - at * w.z, h.xy - at * h.z) : mat2(per_u * light.radius_m);
     float size = max(length(r.spread[0]), length(r.spread[1]));
-    float nearest = sun ? 1.0 - r.u : 2.0 * r.u;    // difference of u to the nearest blocker looked for
+    float nearest = sun ? 1.0 - r.middle - r.u : 2.0 * r.u;    // difference of u to the nearest blocker looked for
     float widest = max(light.border - 0.01, 2.0 * r.texel);
     r.search = clamp(size * nearest, 2.0 * r.texel, sun ? light.border : widest);
     return r;
@@ -80,7 +84,7 @@ Field field_at(Receiver r, vec2 offset, float width) {
     vec2 inside = r.to_atlas * min(width, 0.5 * r.tile_size);
     vec2 uv = clamp(r.centre + r.to_atlas * offset, r.corner + inside, r.corner + r.to_atlas * r.tile_size - inside);
     vec2 moments = moments_at(uv, log2(max(width / (2.0 * r.texel), 1.0)));
-    return Field(moments, r.u + dot(r.slope, (uv - r.centre) / r.to_atlas));
+    return Field(moments, max(r.u + dot(r.slope, (uv - r.centre) / r.to_atlas), r.farthest));
 }
 
 // Light that reaches the plane past that, by Chebyshev's inequality (Donnelly and Lauritzen 2006); exact for one
@@ -140,8 +144,8 @@ float visibility(Light light, vec3 position, vec3 face_normal, bool wanted, floa
     i = 0;
     do {
         vec2 offset = spread * FETCH(tap_table, ivec2(i, 1)).xy;
-        float limit = r.u + dot(r.slope, offset) + bias;
-        sharp_sum += textureLod(shadow_compare, vec3(r.centre + r.to_atlas * offset, 1.0 - limit), 0.0);
+        float limit = max(r.u + dot(r.slope, offset), r.farthest) + bias;
+        sharp_sum += textureLod(shadow_compare, vec3(r.centre + r.to_atlas * offset, 1.0 - r.middle - limit), 0.0);
     } while (++i < sharp);
     float soft_sum = 0.0;
     int smooth_taps = filtered && soft > 0.0 ? filter_taps : 0;
