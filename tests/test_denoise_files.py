@@ -34,6 +34,7 @@ from fsid.sensor import (  # noqa: E402
     to_dn,
     write_dng,
 )
+from fsid.sensor.camera_profile import Measurement  # noqa: E402
 from fsid.sensor.metadata import exposure_metadata  # noqa: E402
 from fsid.sensor.mosaic import pack, unpack  # noqa: E402
 
@@ -192,6 +193,50 @@ def test_noise_beyond_networks_is_said(
         assert ("c.dng: more noise than networks" in capsys.readouterr().err) == told
         main([*command, "--quiet"])
         assert capsys.readouterr().err == ""
+
+
+def test_a_noise_profile_of_zeros_is_none(
+    tmp_path: Path, network: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, zero, below = tmp_path / "in", (0.0,) * 4, (-1e-6,) * 4
+    folder.mkdir()
+    write_dng(folder / "a.dng", noisy_raw())
+    write_dng(folder / "b.dng", replace(noisy_raw(), noise=NoiseLevel(zero, zero)))
+    found = noise_of(read_raw(folder / "b.dng"), None, None, folder / "b.dng")
+    assert found.is_estimated
+    assert 0.5 < found.level.k[1] / PROFILE.level(3200).k[1] < 2
+    main(["denoise", str(folder), str(tmp_path / "out"), "--model", str(network)])
+    assert f"the noise of 1 of 2 files, the first one {folder / 'b.dng'}, is est" in capsys.readouterr().err
+    main(["denoise", str(folder / "b.dng"), str(tmp_path / "b.dng"), "--model", str(network)])
+    assert "its NoiseProfile states no noise at all" in capsys.readouterr().err
+    with pytest.raises(FsidError, match=r"b\.dng: its NoiseProfile holds a variance below 0; give --profile"):
+        noise_of(replace(noisy_raw(), noise=NoiseLevel((1e-3,) * 4, below)), None, None, folder / "b.dng")
+
+
+def test_black_levels_that_a_profile_contradicts_are_said(
+    tmp_path: Path, network: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    measured = Measurement(
+        k_error=np.full((1, 4), 1e-5),
+        sigma2_error=np.full((1, 4), 1e-7),
+        black=np.array([[60.0, 66.0, 64.0, 70.0]]),
+        frames=(20,),
+        dark_frames=(10,),
+    )
+    level = PROFILE.level(800)
+    k, sigma2 = np.array([level.k]), np.array([level.sigma2])
+    mine = replace(PROFILE, name="mine", iso=(800,), k=k, sigma2=sigma2, measured=measured)
+    save_profile(tmp_path / "mine.yaml", mine)
+    np.save(tmp_path / "a.npy", to_dn(noisy_raw()))
+    command = ["denoise", str(tmp_path / "a.npy"), str(tmp_path / "a.dng"), "--model", str(network)]
+    command += ["--profile", str(tmp_path / "mine.yaml"), "--iso", "800", "--cfa", PROFILE.cfa]
+    for levels, is_said in (("65", True), ("60,66,64,70", False)):
+        main([*command, "--white-level", "1023", "--black-level", levels])
+        assert ("without --black-level 60,66,64,70" in capsys.readouterr().err) == is_said
+    for levels in ("60,66", "60;66", ""):
+        with pytest.raises(SystemExit):
+            main([*command, "--white-level", "1023", "--black-level", levels])
+        assert "--black-level" in capsys.readouterr().err
 
 
 def test_an_unreadable_file_is_left_out_of_a_folder(
@@ -414,7 +459,7 @@ def test_files_in_subfolders_are_left_out_and_counted(
     write_dng(folder / "a.dng", noisy_raw())
     for _ in range(2):  # the second time results lie inside, too
         main(command)
-        (line,) = (line for line in capsys.readouterr().err.splitlines() if "note:" in line)
+        (line,) = (line for line in capsys.readouterr().err.splitlines() if "left out" in line)
         assert line.startswith(f"note: files in folders inside {folder} are left out (2, the first one")
     main([*command, "--quiet"])
     assert capsys.readouterr().err == ""
@@ -435,7 +480,7 @@ def test_files_of_the_other_kind_are_left_out_and_counted(
     ):
         out = tmp_path / f"out-{advice}"
         main(["denoise", str(folder), str(out), "--model", str(network), *options])
-        (line,) = (line for line in capsys.readouterr().err.splitlines() if "note:" in line)
+        (line,) = (line for line in capsys.readouterr().err.splitlines() if "left out" in line)
         assert line.startswith(f"note: {first}")
         assert line.endswith(f"denoise them {advice} --cfa, --black-level and --white-level")
         assert len(list(out.iterdir())) == 2

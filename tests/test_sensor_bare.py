@@ -102,3 +102,50 @@ def test_real_samples_open_and_their_pattern_is_right(shared_data):
         saturation[cfa] = np.mean(np.abs(gr - gb))
         assert np.all(np.isfinite(develop(raw)))
     assert max(saturation["RGGB"], saturation["BGGR"]) < 0.2 * min(saturation["GRBG"], saturation["GBRG"])
+
+
+def test_sites_of_other_black_levels_are_each_taken_from_their_own(tmp_path):
+    levels = (250.0, 256.0, 254.5, 262.0)
+    np.save(tmp_path / "a.npy", DN)
+    raw = read_mosaic(tmp_path / "a.npy", **(CAMERA | {"black_level": levels}))
+    span = 4095 - raw.black_level
+    expected = (pack(DN.astype(np.float64), "GRBG") - np.array(levels)[:, None, None]) / span
+    np.testing.assert_allclose(pack(raw.mosaic, "GRBG"), expected, atol=1e-6)
+    with pytest.raises(FsidError, match=r"a\.npy: 3 black levels"):
+        read_mosaic(tmp_path / "a.npy", **(CAMERA | {"black_level": levels[:3]}))
+    with pytest.raises(FsidError, match=r"a\.npy: black level -1"):
+        read_mosaic(tmp_path / "a.npy", **(CAMERA | {"black_level": (-1, 1, 1, 1)}))
+
+
+def _through_filters(rng, filters):
+    """DN of a textured grey scene behind a colour filter array of which `filters` is the repeating tile."""
+    grey = np.kron(rng.uniform(0.2, 1.0, (24, 32)), np.ones((8, 8)))
+    gains = np.array([{"R": 0.5, "G": 1.0, "B": 0.6, "W": 1.8}[colour] for row in filters for colour in row])
+    tile = gains.reshape(len(filters), len(filters[0]))
+    repeats = -(-np.array(grey.shape) // tile.shape)
+    light = 1500 * grey * np.tile(tile, repeats)[: grey.shape[0], : grey.shape[1]]
+    return (256 + rng.poisson(light)).astype(np.uint16)
+
+
+@pytest.mark.parametrize(
+    ("filters", "words"),
+    [
+        (("GR", "BG"), None),
+        (("RRGG", "RRGG", "GGBB", "GGBB"), "quad-Bayer"),
+        (("RWGW", "WRWG", "GWBW", "WGWB"), "RGBW"),
+        (("GBGGRG", "RGRBGB", "GBGGRG", "GRGGBG", "BGBRGR", "GRGGBG"), "X-Trans"),
+    ],
+)
+def test_mosaics_of_other_filters_are_no_bayer_mosaics(tmp_path, rng, filters, words):
+    np.save(tmp_path / "a.npy", _through_filters(rng, filters))
+    if words is None:
+        read_mosaic(tmp_path / "a.npy", **CAMERA)
+    else:
+        with pytest.raises(FsidError, match=rf"a\.npy: .*{words}"):
+            read_mosaic(tmp_path / "a.npy", **CAMERA)
+
+
+def test_a_tiff_of_several_mosaics_is_refused(tmp_path):
+    tifffile.imwrite(tmp_path / "a.tif", np.stack([DN, DN]), photometric="minisblack")
+    with pytest.raises(FsidError, match=r"a\.tif: .*several mosaics"):
+        read_mosaic(tmp_path / "a.tif", **CAMERA)

@@ -21,6 +21,7 @@ from fsid.sensor import (
     write_dng,
 )
 from fsid.sensor.frames import find_frames
+from fsid.sensor.mosaic import site_offsets
 from stated_black import state_black
 
 PROFILE = load_profile("galaxy-s22")
@@ -291,6 +292,26 @@ def test_a_black_level_that_dark_frames_miss_is_noted(tmp_path, rng):
     for stated, is_noted in ((LAYOUT.black_level, False), (LAYOUT.black_level + 6, True)):
         found = calibrate(lit, name="x", dark=dark, layout=replace(LAYOUT, black_level=stated))
         assert any(f"--black-level is {stated}" in note for note in found.notes) == is_noted
+
+
+def test_sites_of_other_black_levels_are_measured_stated_and_kept(tmp_path, rng):
+    """k and sigma2 are those of the camera with and without dark frames; the profile has the true levels."""
+    above = np.zeros((SIDE, SIDE), np.uint16)
+    levels, truth = np.array([60, 66, 64, 70]), PROFILE.level(800)
+    for (row, column), level in zip(site_offsets(PROFILE.cfa), levels, strict=True):
+        above[row::2, column::2] = level - 60
+    clean, covered = (replace(scene(light), black_level=60) for light in (0.8, 0.0))
+    lit = write_arrays(tmp_path / "lit", [to_dn(raw) + above for raw in exposures(rng, clean, 800, 20)])
+    dark = write_arrays(tmp_path / "dark", [to_dn(raw) + above for raw in exposures(rng, covered, 800, 20)])
+    for black_level, frames in ((None, dark), (tuple(levels), dark), (tuple(levels), [])):
+        found = calibrate(lit, name="x", dark=frames, layout=replace(LAYOUT, black_level=black_level))
+        fit = found.fits[0]
+        np.testing.assert_allclose(fit.black, levels, atol=0.1)
+        within(fit.k_dn, np.array(truth.k) * 963, fit.k_dn_error)
+        within(fit.sigma2_dn, np.array(truth.sigma2) * 963**2, fit.sigma2_dn_error)
+        assert found.profile.black_level == 65
+        np.testing.assert_allclose(found.profile.measured.black[0], levels, atol=0.1)
+        assert any("sites differ" in note for note in found.notes)
 
 
 def test_what_levels_contradict_is_refused(tmp_path, rng):

@@ -68,6 +68,7 @@ def foreign_dng(illuminants: tuple[int, int] = (17, 21)) -> bytes:
         271: "Maker",
         272: "Model One",
         306: "2026:11:21 05:00:00",
+        270: "a cup",
         315: "A. Tester",
         50708: "Maker One",
     }

@@ -7,5 +7,22 @@ from typing import Annotated
 
 import tyro
 
+from fsid.errors import FsidError
+
 Output = Annotated[Path, tyro.conf.arg(name="output", aliases=["-o"])]
 OptionalOutput = Annotated[Path | None, tyro.conf.arg(name="output", aliases=["-o"])]
+
+
+def black_levels(text: str | None) -> tuple[float, ...] | None:
+    """--black-level: one number, or four with commas between them; FsidError for anything else."""
+    if text is None:
+        return None
+    try:
+        levels = tuple(float(number) for number in text.split(","))
+    except ValueError:
+        levels = ()
+    if len(levels) not in (1, 4):
+        raise FsidError(
+            f"--black-level {text}: give one number, or those of R, Gr, Gb and B as in 60,66,64,70"
+        )
+    return levels

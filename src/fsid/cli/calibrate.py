@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 from tyro.conf import Positional
 
-from fsid.cli.arguments import Output
+from fsid.cli.arguments import Output, black_levels
 from fsid.cli.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ def calibrate(
     iso: float | None = None,
     plot: Path | None = None,
     cfa: Literal["RGGB", "BGGR", "GRBG", "GBRG", "MONO"] | None = None,
-    black_level: int | None = None,
+    black_level: str | None = None,
     white_level: int | None = None,
     width: int | None = None,
     height: int | None = None,
@@ -49,7 +49,8 @@ def calibrate(
             of several ISOs are refused.
         plot: Picture of samples, lines and residuals to write (.png, .pdf or .svg).
         cfa: Colours of a bare mosaic's first 2x2 pixels, read row by row; MONO for no colour filters.
-        black_level: Black level of bare mosaics in DN; needed where there are no dark frames.
+        black_level: Black level of bare mosaics in DN; where they differ those of R, Gr, Gb and B, as in
+            60,66,64,70. Needed where there are no dark frames.
         white_level: White level (saturation) of bare mosaics in DN; by default from the largest value.
         width: Width of .raw or .bin mosaics in pixels.
         height: Height of .raw or .bin mosaics in pixels.
@@ -67,7 +68,7 @@ def calibrate(
     from fsid.sensor.profiles import profile_file
 
     check_profile(output, [*frame_files(frames), *frame_files(dark)], plot)
-    layout = Layout(iso, cfa, black_level, white_level, width, height)
+    layout = Layout(iso, cfa, black_levels(black_level), white_level, width, height)
     with progress_bar("reading", "frames", quiet=quiet) as progress:
         found = calibrate_frames(
             frames,

@@ -7,10 +7,12 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+import numpy as np
 from rich.console import Console
 from rich.text import Text
 from tyro.conf import Positional
 
+from fsid.cli.arguments import black_levels
 from fsid.cli.iso_notes import note_extrapolation, note_files
 from fsid.cli.progress import progress_bar
 from fsid.errors import FsidError
@@ -30,7 +32,7 @@ def denoise(
     strength: float = 1.0,
     backend: Literal["torch", "onnx"] | None = None,
     cfa: str | None = None,
-    black_level: int | None = None,
+    black_level: str | None = None,
     white_level: int | None = None,
     width: int | None = None,
     height: int | None = None,
@@ -55,7 +57,8 @@ def denoise(
         backend: What runs the network: torch (on a GPU where there is one) or onnx (onnxruntime, on the CPU);
             by default onnx for an .onnx file, else torch.
         cfa: Colours of a bare mosaic's first 2x2 pixels, read row by row: RGGB, BGGR, GRBG or GBRG.
-        black_level: Black level of a bare mosaic in DN.
+        black_level: Black level of a bare mosaic in DN; where they differ those of R, Gr, Gb and B, as in
+            60,66,64,70.
         white_level: White level (saturation) of a bare mosaic in DN.
         width: Width of a .raw or .bin mosaic in pixels.
         height: Height of a .raw or .bin mosaic in pixels.
@@ -64,11 +67,12 @@ def denoise(
     from fsid.denoise import check_options, denoise_file, denoise_folder, find_raws, load_model
     from fsid.sensor import Layout
 
-    given = Layout(None, cfa, black_level, white_level, width, height)
+    given = Layout(None, cfa, black_levels(black_level), white_level, width, height)
     layout = given if given != Layout() else None
     sources = find_raws(input, bare=layout is not None) if input.is_dir() else None
     if layout is not None:
         _check_layout(layout, sources or [input])
+        _note_black(layout, profile, quiet=quiet)
     network = load_model(model, backend)
     check_options(profile, iso, strength, layout)
     console = Console(stderr=True)
@@ -91,6 +95,7 @@ def denoise(
                 progress=progress,
                 failed=lambda error: console.print(Text(f"fsid: {error}", style="bold red"), soft_wrap=True),
             )
+        _note_guessed(noises, quiet=quiet)
         _note_strong(noises, quiet=quiet)
         return
     with progress_bar("denoising", "tiles", quiet=quiet) as progress:
@@ -109,6 +114,31 @@ def denoise(
         line = f"noise: {noise.source}, k = {k:.3g}, sigma2 = {sigma2:.3g}"
         console.print(Text(line), soft_wrap=True)
     _note_strong({input: noise}, quiet=quiet)
+
+
+def _note_black(layout: Layout, profile: str | None, *, quiet: bool) -> None:
+    """A line where the calibration of the camera measured other black levels than those that are stated."""
+    from fsid.sensor import load_bayer_profile
+    from fsid.sensor.camera_fit import SITES_APART_DN
+
+    measured = None if profile is None else load_bayer_profile(profile).measured
+    if measured is None or layout.black_level is None:
+        return
+    black = measured.black.mean(axis=0)
+    if np.abs(black - np.asarray(layout.black_level)).max() > SITES_APART_DN:
+        levels = ",".join(f"{level:.4g}" for level in black)
+        line = f"note: without --black-level {levels}, as profile {profile} measured, a cast stays"
+        Console(stderr=True, quiet=quiet).print(Text(line), soft_wrap=True)
+
+
+def _note_guessed(noises: Mapping[Path, Noise], *, quiet: bool) -> None:
+    """A line on the files whose noise nothing states."""
+    if guessed := [path for path, noise in noises.items() if noise.is_estimated]:
+        line = (
+            f"note: the noise of {len(guessed)} of {len(noises)} files, the first one {guessed[0]}, is "
+            "estimated from the images; --profile and --iso state it"
+        )
+        Console(stderr=True, quiet=quiet).print(Text(line), soft_wrap=True)
 
 
 def _note_strong(noises: Mapping[Path, Noise], *, quiet: bool) -> None:
@@ -156,4 +186,5 @@ def _check_layout(layout: Layout, paths: Sequence[Path]) -> None:
     if layout.cfa is None or layout.black_level is None or layout.white_level is None:
         raise FsidError("a bare mosaic needs all three: --cfa, --black-level and --white-level")
     check_cfa(layout.cfa, "--cfa")
-    check_levels(layout.black_level, layout.white_level, "--black-level and --white-level")
+    for level in np.atleast_1d(layout.black_level):
+        check_levels(level, layout.white_level, "--black-level and --white-level")

@@ -36,10 +36,11 @@ _SMALLEST_PX = 22  # LibRaw takes no smaller image for a RAW
 
 @dataclass(frozen=True)
 class Noise:
-    """A noise level, and in words where it came from."""
+    """A noise level, and in words where it came from. is_estimated: from the image itself."""
 
     level: NoiseLevel
     source: str
+    is_estimated: bool = False
 
 
 def find_raws(folder: str | Path, *, bare: bool = False) -> list[Path]:
@@ -109,22 +110,29 @@ def _check_iso(profile: str | None, iso: float | None) -> None:
 
 
 def noise_of(raw: Raw, profile: str | None, iso: float | None, path: Path) -> Noise:
-    """The level of a profile at an ISO (by default the file's), else the file's own, else the image's."""
+    """The level of a profile at an ISO (by default the file's), else the file's own, else the image's.
+
+    A NoiseProfile of zeros is none: cameras and converters write it where they know no better.
+    """
     _check_iso(profile, iso)
     if profile is not None:
         iso = iso if iso is not None else raw.iso
         if not iso > 0:
             raise FsidError(f"{path}: its ISO is unknown, give --iso")
         return Noise(load_bayer_profile(profile).level(iso), f"profile {profile} at ISO {iso:g}")
-    if raw.noise is not None:
+    advice = "give --profile NAME --iso N (fsid profiles lists them)"
+    stated = () if raw.noise is None else (*raw.noise.k, *raw.noise.sigma2)
+    if raw.noise is not None and any(stated):
+        if min(stated) < 0:
+            raise FsidError(f"{path}: its NoiseProfile holds a variance below 0; {advice}")
         return Noise(raw.noise, "the file's NoiseProfile")
+    lack = "holds no NoiseProfile" if raw.noise is None else "its NoiseProfile states no noise at all"
     try:
-        return Noise(estimate_noise(raw).level, "estimated from the image")
+        level = estimate_noise(raw).level
     except FsidError as error:
-        raise FsidError(
-            f"{path}: holds no NoiseProfile, and {error}; give --profile NAME --iso N "
-            "(fsid profiles lists them)"
-        ) from None
+        raise FsidError(f"{path}: {lack}, and {error}; {advice}") from None
+    source = "estimated from the image" if raw.noise is None else f"estimated from the image ({lack})"
+    return Noise(level, source, is_estimated=True)
 
 
 def denoise_file(

@@ -10,6 +10,7 @@ The values are DN; `x = (DN - black_level) / (white_level - black_level)` as eve
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,12 +19,15 @@ import tifffile
 from PIL import Image
 
 from fsid.errors import FsidError
+from fsid.sensor.black_levels import BlackLevels
 from fsid.sensor.colour import published_matrices
 from fsid.sensor.mosaic import check_cfa, unpack
-from fsid.sensor.quantise import MAX_DN, check_levels, from_dn
+from fsid.sensor.quantise import MAX_DN, check_levels
 from fsid.sensor.raw import Raw
 
 MAX_PIXELS = 1 << 29
+_PLACES_DIFFER, _SIGNIFICANT = 0.05, 8.0  # of the level, and in errors: colours differ by far more
+_LEAST_PIXELS = 256
 BEYOND_WHITE, BEYOND_WHITE_SHARE = 1.1, 0.001  # of the range; of the values: the white level is wrong
 logging.getLogger("tifffile").setLevel(
     logging.CRITICAL
@@ -34,11 +38,14 @@ BARE_SUFFIXES = (*HEADERLESS_SUFFIXES, ".npy", ".png", ".tif", ".tiff")
 
 @dataclass(frozen=True)
 class Layout:
-    """What a bare mosaic does not say; None where it must be found. cfa "MONO" for no colour filters."""
+    """What a bare mosaic does not say; None where it must be found. cfa "MONO" for no colour filters.
+
+    black_level: DN, fractions included; of all pixels, or of the sites R, Gr, Gb, B.
+    """
 
     iso: float | None = None
     cfa: str | None = None
-    black_level: int | None = None
+    black_level: float | Sequence[float] | None = None
     white_level: int | None = None
     width: int | None = None
     height: int | None = None
@@ -62,7 +69,7 @@ def read_mosaic(
     path: str | Path,
     *,
     cfa: str,
-    black_level: int,
+    black_level: float | Sequence[float],
     white_level: int,
     width: int | None = None,
     height: int | None = None,
@@ -73,20 +80,25 @@ def read_mosaic(
 ) -> Raw:
     """The mosaic file at `path` as `Raw`; an odd last row or column is dropped.
 
-    width, height: pixels, needed for .raw and .bin, checked for the others where given. black_level,
-    white_level: DN. xyz_to_camera: the mean of the published matrices where None. FsidError: missing or
-    unreadable file, wrong size, not integers, values above 16 bits.
+    width, height: pixels, needed for .raw and .bin, checked for the others where given. black_level: DN, of
+    all pixels or of the sites R, Gr, Gb, B. white_level: DN. xyz_to_camera: the mean of the published
+    matrices where None. FsidError: missing or unreadable file, wrong size, not integers, values above 16
+    bits, what looks like no Bayer mosaic.
     """
     check_cfa(cfa, f"{path}: cfa")
-    check_levels(black_level, white_level, str(path))
+    black = BlackLevels.stated(black_level, cfa, str(path))
+    for level in (black.tile.min(), black.tile.max()):
+        check_levels(level, white_level, str(path))
     if len(white_balance) != 3 or not min(white_balance) > 0:
         raise FsidError(f"{path}: white_balance {white_balance} must be three positive gains")
     dn = read_dn(path, cfa=cfa, width=width, height=height)
-    check_white(dn, black_level, white_level, path)
+    check_bayer(dn, path)
+    level = round(black.mean())
+    check_white(dn, level, white_level, path)
     return Raw(
-        mosaic=from_dn(dn, black_level, white_level),
+        mosaic=black.normalised(dn, level, white_level),
         cfa=cfa,
-        black_level=black_level,
+        black_level=level,
         white_level=white_level,
         white_balance=white_balance,
         xyz_to_camera=published_matrices().mean(axis=0) if xyz_to_camera is None else xyz_to_camera,
@@ -117,6 +129,26 @@ def read_dn(
     if (height or dn.shape[0], width or dn.shape[1]) != dn.shape:
         raise FsidError(f"{path}: is {dn.shape[1]}x{dn.shape[0]}, not {width}x{height}; correct the size")
     return dn[: dn.shape[0] // 2 * 2, : dn.shape[1] // 2 * 2]
+
+
+def check_bayer(dn: np.ndarray, path: str | Path) -> None:
+    """FsidError where pixels of one Bayer site differ by their place in 4x4 or 6x6 pixels.
+
+    Those of quad-Bayer, RGBW (4x4) and X-Trans (6x6) sensors do, since they have filters of other colours.
+    """
+    for period, kinds in ((4, "quad-Bayer or RGBW"), (6, "X-Trans")):
+        places = [dn[r::period, c::period] for r in range(period) for c in range(period)]
+        if min(place.size for place in places) < _LEAST_PIXELS:
+            continue
+        means = np.array([place.mean(dtype=np.float64) for place in places]).reshape(period, period)
+        errors = np.array([place.std(dtype=np.float64) / np.sqrt(place.size) for place in places])
+        for r, c in np.ndindex(2, 2):
+            site = means[r::2, c::2]
+            if np.ptp(site) > max(_PLACES_DIFFER * site.mean(), _SIGNIFICANT * errors.max()):
+                raise FsidError(
+                    f"{path}: looks like no Bayer mosaic but like {kinds} (a colour differs by its place in "
+                    f"{period}x{period} pixels); make a Bayer mosaic of it first"
+                )
 
 
 def check_white(dn: np.ndarray, black_level: int, white_level: int, path: str | Path) -> None:
@@ -160,6 +192,8 @@ def _read_png(path: Path) -> np.ndarray:
 def _read_tiff(path: Path) -> np.ndarray:
     with tifffile.TiffFile(path) as file:
         _check_size(file.pages.first.shape)
+        if sum(page.shape == file.pages.first.shape for page in file.pages) > 1:
+            raise ValueError("it holds several mosaics; write each to a file of its own")
         return file.pages.first.asarray()
 
 

@@ -8,11 +8,13 @@ the first pixel of the active area on.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from fsid.sensor.mosaic import pack
+from fsid.errors import FsidError
+from fsid.sensor.mosaic import pack, site_offsets
 from fsid.sensor.quantise import from_dn
 
 
@@ -23,6 +25,18 @@ class BlackLevels:
     tile: np.ndarray
     of_row: np.ndarray
     of_column: np.ndarray
+
+    @staticmethod
+    def stated(levels: float | Sequence[float], cfa: str | None, where: str) -> BlackLevels:
+        """One level of all pixels, or those of R, Gr, Gb, B; FsidError, naming `where`, for other counts."""
+        each = np.atleast_1d(np.asarray(levels, np.float64))
+        if each.shape not in ((1,), (4,)) or (len(each) == 4 and cfa is None):
+            sites = "one, or one each of R, Gr, Gb and B" if cfa else "one"
+            raise FsidError(f"{where}: {len(each)} black levels; {sites} is possible")
+        tile = np.full((2, 2), each[0])
+        for place, level in zip(site_offsets(cfa) if cfa else (), np.broadcast_to(each, 4), strict=False):
+            tile[place] = level
+        return BlackLevels(tile, np.zeros(2), np.zeros(2))
 
     def mean(self) -> float:
         """Mean over the image, as near as whole tiles are."""
@@ -51,9 +65,12 @@ class BlackLevels:
 
     def of_sites(self, black: int, cfa: str) -> np.ndarray:
         """(4,) mean black level that `levelled` leaves R, Gr, Gb, B, fractions included."""
-        height, width = len(self.of_row) // 2 * 2, len(self.of_column) // 2 * 2
-        above = self._above(black, (height, width))
+        above = self._above_whole_tiles(black)
         return black + pack(above - np.rint(above), cfa).mean(axis=(1, 2), dtype=np.float64)
+
+    def moved(self, black: int, cfa: str) -> np.ndarray:
+        """(4,) mean DN that `levelled` takes off R, Gr, Gb, B."""
+        return pack(np.rint(self._above_whole_tiles(black)), cfa).mean(axis=(1, 2), dtype=np.float64)
 
     def fits(self, shape: tuple[int, ...]) -> bool:
         """Whether an image of another size (H, W) has these levels, too."""
@@ -64,6 +81,9 @@ class BlackLevels:
         if self.of_row.any() or self.of_column.any():
             return self.of_row[: shape[0]], self.of_column[: shape[1]]
         return np.zeros(shape[0]), np.zeros(shape[1])
+
+    def _above_whole_tiles(self, black: int) -> np.ndarray:
+        return self._above(black, (len(self.of_row) // 2 * 2, len(self.of_column) // 2 * 2))
 
     def _above(self, black: int, shape: tuple[int, ...]) -> np.ndarray:
         rows, columns = (np.arange(side) % n for side, n in zip(shape, self.tile.shape, strict=True))

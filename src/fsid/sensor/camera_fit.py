@@ -30,6 +30,7 @@ DARK_LEVEL = 0.05  # of the range, above which a dark frame saw light
 DARK_CONTRAST = 0.02  # of the range between blocks, above which a dark frame shows a picture
 BLACK_DIFFERS = 0.01  # of the range, from which on dark frames contradict a black level that the user states
 BLACK_NOTED_DN = 1.0  # from which on it is noted, and from their own noise on
+SITES_APART_DN = 0.5  # from which on one black level for all sites leaves a cast in the dark
 BELOW_BLACK = 0.01  # of the pixels that may have a mean as far below the black level
 UNCERTAIN = 0.02  # relative standard error of k that deserves a note
 
@@ -67,8 +68,9 @@ def calibrate(
     found = find_frames(list(map(Path, paths)), list(map(Path, dark)), layout)
     isos = sorted({frame.iso for frame in found.frames})
     reader = _Reader(found, layout, progress, terms=terms)
-    fits = [_fit_iso(reader, iso, tie_greens) for iso in isos]
     seen = found.camera
+    fits = [_fit_iso(reader, iso, tie_greens) for iso in isos]
+    fits = [replace(fit, black=fit.black + seen.moved()) for fit in fits]
     profile = profile_of(
         dict(zip(isos, fits, strict=True)),
         name=name,
@@ -133,8 +135,8 @@ def _fit_iso(reader: _Reader, iso: float, tie_greens: bool) -> NoiseFit:
     darks = [frame for frame in reader.found.dark if frame.iso == iso]
     if len(lights) + len(darks) < MIN_FRAMES:
         raise FsidError(
-            f"{lights[0].path}: only {len(lights) + len(darks)} frames of ISO {iso:g}; a calibration needs "
-            f"at least {MIN_FRAMES}, and 20 or more to be good"
+            f"{lights[0].path}: only {len(lights)} frames and {len(darks)} dark frames of ISO {iso:g}; a "
+            f"calibration needs at least {MIN_FRAMES} in all, and 20 or more to be good"
         )
     black, pooled = _pool_dark(reader, iso, darks)
     if black is None:
@@ -259,6 +261,10 @@ def _notes(reader: _Reader, isos: Sequence[float], fits: Sequence[NoiseFit]) -> 
     for stated, measured, path in reader.blacks:
         source = "--black-level" if reader.found.camera.bare else "the files' black level"
         yield f"{path}: dark frames have a mean of {measured:.1f} DN, {source} is {stated}, which is kept"
+    black = np.mean([fit.black for fit in fits], axis=0)
+    if reader.found.camera.bare and np.ptp(black) > SITES_APART_DN:
+        levels = ",".join(f"{level:.4g}" for level in black)
+        yield f"the black levels of the sites differ: denoise such mosaics with --black-level {levels}"
     for iso in sorted(set(reader.cut_off)):
         yield f"ISO {iso:g}: dark noise reaches DN 0 and is cut off; corrected as far as it is Gaussian"
     for iso, fit in zip(isos, fits, strict=True):

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from fsid.errors import FsidError
-from fsid.sensor.bare import BARE_SUFFIXES, Layout, check_white, read_dn
+from fsid.sensor.bare import BARE_SUFFIXES, Layout, check_bayer, check_white, read_dn
 from fsid.sensor.black_levels import BlackLevels
 from fsid.sensor.dng import RawHeader, read_header, read_stored
 from fsid.sensor.mosaic import check_cfa
@@ -34,7 +34,7 @@ _SITES_DIFFER = 0.02  # of the level: a flat grey through colour filters differs
 class Camera:
     """What all frames of a calibration share. cfa: None without filters. black_level: None where unknown.
 
-    black: of every pixel of the first frame; None of bare mosaics.
+    black: of every pixel of the first frame, of bare mosaics what the caller states; None where unknown.
     """
 
     name: str
@@ -49,8 +49,14 @@ class Camera:
         if self.black_level is None:
             return None
         if self.black is None or self.cfa is None:
-            return np.full(1 if self.cfa is None else 4, float(self.black_level))
+            return np.full(1, float(self.black_level) if self.black is None else self.black.mean())
         return self.black.of_sites(self.black_level, self.cfa)
+
+    def moved(self) -> np.ndarray:
+        """(4,) or (1,) DN that `FrameSet.read` takes off the sites, so that their black levels are alike."""
+        if self.black_level is None or self.black is None or self.cfa is None:
+            return np.zeros(1)
+        return self.black.moved(self.black_level, self.cfa)
 
 
 @dataclass(frozen=True)
@@ -80,8 +86,13 @@ class FrameSet:
         first frame are made alike. A black level that drifts from frame to frame is in the integers already.
         """
         camera = self.camera
-        if camera.black is None or camera.black_level is None:
-            return read_dn(frame.path, cfa=camera.cfa, width=layout.width, height=layout.height)
+        if camera.bare:
+            dn = read_dn(frame.path, cfa=camera.cfa, width=layout.width, height=layout.height)
+            if camera.black is None or camera.black_level is None:
+                return dn
+            return camera.black.levelled(dn, camera.black_level, camera.white_level)
+        assert camera.black is not None
+        assert camera.black_level is not None
         stored = read_stored(frame.path)
         drift_dn = abs(stored.black.mean() - camera.black.mean())
         if (stored.cfa, stored.white_level) != (camera.cfa, camera.white_level) or drift_dn > SAME_BLACK_DN:
@@ -195,16 +206,21 @@ def _bare_frames(
     progress: Callable[[int, int], None] | None,
 ) -> FrameSet:
     cfa = None if layout.cfa in (None, "MONO") else check_cfa(str(layout.cfa), "--cfa")
+    levels = layout.black_level
+    black = None if levels is None else BlackLevels.stated(levels, cfa, "--black-level")
+    level = None if black is None else round(black.mean())
     frames: list[Frame] = []
     highest, shape = 0, None
     for number, path in enumerate((*paths, *dark)):
         dn = read_dn(path, cfa=cfa, width=layout.width, height=layout.height)
         if shape not in (None, dn.shape):
             raise FsidError(f"{path}: is {dn.shape[1]}x{dn.shape[0]}, the first frame is another size")
-        if number == 0 and layout.cfa is None:
-            _check_mono(path, dn)
+        if number == 0:
+            check_bayer(dn, path)
+            if layout.cfa is None:
+                _check_mono(path, dn)
         if layout.white_level is not None:
-            check_white(dn, layout.black_level or 0, layout.white_level, path)
+            check_white(dn, level or 0, layout.white_level, path)
         shape, highest = dn.shape, max(highest, int(dn.max()))
         frames.append(Frame(path, _iso_in(path), 0.0, float(dn.mean())))
         if progress is not None:
@@ -217,8 +233,9 @@ def _bare_frames(
             f"white level {white} DN taken from the largest value, {highest}; --white-level states it"
         )
     frames, assumed = _with_iso(frames, layout.iso)
-    check_levels(layout.black_level or 0, white, str(paths[0]))
-    camera = Camera("", cfa, layout.black_level, white, bare=True)
+    for stated in (0.0,) if black is None else (black.tile.min(), black.tile.max()):
+        check_levels(stated, white, str(paths[0]))
+    camera = Camera("", cfa, level, white, bare=True, black=black)
     return FrameSet(camera, tuple(frames[: len(paths)]), tuple(frames[len(paths) :]), "", (*notes, *assumed))
 
 

@@ -4,7 +4,8 @@
 
 Kept are the tags that describe camera, colour, lens, exposure and time, value for value. Not kept are those
 that describe pixels as they were stored (compression, levels, linearisation: FSID writes its own), maker
-notes, whose inner offsets break when they move, and where the picture was taken. Files that are no TIFF (CR3,
+notes, whose inner offsets break when they move, and where the picture was taken: GPS, and XMP and IPTC, which
+may hold it. Files that are no TIFF (CR3,
 RAF) say orientation, exposure and lens through LibRaw instead.
 """
 
@@ -21,15 +22,15 @@ DATE_TAKEN = 36867
 CROP_ORIGIN, CROP_SIZE = 50719, 50720
 COLOUR_MATRICES = frozenset((50721, 50722, 50723, 50724, 50725, 50726, 50778, 50779, 50964, 50965))
 
-# Make, model, orientation, date, artist, copyright; DNG: camera, colour calibration, lens, profile.
-_FIRST = frozenset((271, 272, ORIENTATION, 306, 315, 33432, 50707, 50708, 50709)) | COLOUR_MATRICES
+# Description, make, model, orientation, date, artist, copyright; DNG: camera, colour, lens, profile.
+_FIRST = frozenset((270, 271, 272, ORIENTATION, 306, 315, 33432, 50707, 50708, 50709)) | COLOUR_MATRICES
 _FIRST |= frozenset((50727, 50730, 50731, 50732, 50734, 50735, 50736, 50739, 50931, 50932))
 _FIRST |= frozenset((*range(50936, 50943), 50981, 50982, 51107, 51108, 51109, 51110))
 # Crop, green split, chroma blur, anti-alias, scale; lens corrections that converters apply to linear data.
 _MOSAIC = frozenset((CROP_ORIGIN, CROP_SIZE, 50718, 50733, 50737, 50738, 50780, 51009, 51022, 51125))
 _GEOMETRY = frozenset((CROP_ORIGIN, CROP_SIZE, 51009, 51022, 51125))
 _EXIF = frozenset((EXPOSURE_TIME, F_NUMBER, 34850, 34855, 34864, 34866, 36864, 36867, 36868, 36880, 36881))
-_EXIF |= frozenset((*range(37377, 37387), 37520, 37521, 37522, 41985, 41986, 41987, 41989, 41990))
+_EXIF |= frozenset((*range(37377, 37387), 37510, 37520, 37521, 37522, 41985, 41986, 41987, 41989, 41990))
 _EXIF |= frozenset((42033, 42034, 42035, FOCAL_LENGTH, LENS_MODEL, 42037))
 
 _ORIENTATION_OF_FLIP = {0: 1, 3: 3, 5: 8, 6: 6}  # LibRaw's flip to TIFF's orientation
