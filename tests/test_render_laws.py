@@ -217,6 +217,22 @@ def test_normal_and_id_of_a_sphere(renderer: Renderer) -> None:
     assert np.isinf(frame.depth[missed]).all()
 
 
+def test_normals_face_the_viewer(renderer: Renderer) -> None:
+    """One that interpolation or relief turned away is mirrored, n - 2 (n v) v: no surface seen has such."""
+    tilted = np.array([0.96, 0.0, 0.28])
+    flat = grid(2.0)
+    mesh = replace(flat, normals=np.tile(tilted.astype(np.float32), (len(flat.vertices), 1)))
+    camera = Camera((-1.5, 0.0, 0.4), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 30.0, 96, 96)
+    frame = draw(renderer, view(lambertian(mesh), camera=camera))
+    rays, rotation = pixel_rays(camera)
+    v = -rays / np.linalg.norm(rays, axis=-1, keepdims=True)
+    expected = (tilted - 2 * (v @ tilted)[..., None] * v) @ rotation.T * [1, 1, -1]
+    seen = frame.object_id == 0
+    assert seen.mean() > 0.3
+    assert (v @ tilted)[seen].max() < 0
+    np.testing.assert_allclose(frame.normal[seen], expected[seen], atol=0.01)
+
+
 def test_the_first_row_is_the_top_and_x_goes_right(renderer: Renderer) -> None:
     ball = lambertian(sphere(0.1), at=Transform((0.5, 0.6, 0.1), (0, 0, 0), (1, 1, 1)))
     frame = draw(renderer, view(ball))

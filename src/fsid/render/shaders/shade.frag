@@ -135,6 +135,10 @@ vec3 moves(Sample p, vec3 ray, vec3 step) {
     return p.depth * (step - ray * (dot(p.face_normal, step) / limited));
 }
 
+// A normal that is seen from v: relief and interpolation turn some away where nothing that is seen does. Those
+// are mirrored, so that light does not jump where they begin to.
+vec3 facing(vec3 n, vec3 v) { return n - 2.0 * min(dot(n, v), 0.0) * v; }
+
 void main() {
     BEGIN(pixel);
     vec3 local = ray_at(vec2(pixel) + 0.5);
@@ -162,7 +166,7 @@ void main() {
         Matter m = matter_at(s, p.position, smooth_normal, moves(p, ray, right), moves(p, ray, down));
         bool front = dot(smooth_normal, p.face_normal) > 0.0;
         vec3 turned = front ? smooth_normal : -smooth_normal;
-        m.normal = front ? m.normal : -m.normal;
+        m.normal = facing(front ? m.normal : -m.normal, -normalize(ray));
         bool part = false;
         vec3 light = radiance(p, s, m, spread, part);
         missing = missing || part && hit;
@@ -188,8 +192,8 @@ void main() {
     vec4 light = vec4(sum * (gain / float(COUNT)), label.surface >= 0 ? label.depth : 0.0);
     vec4 labels = vec4(albedo / float(COUNT), float(id) / 65535.0);
     vec3 normal = dot(label.normal, label.face_normal) < 0.0 ? -label.normal : label.normal;
-    normal = axes * normalize(normal + relief) * vec3(1, 1, -1);
-    vec4 facing = vec4(0.5 + 0.5 * (label.surface >= 0 ? normal : vec3(0, 0, 1)), 0.0);
+    normal = axes * facing(normalize(normal + relief), -normalize(ray)) * vec3(1, 1, -1);
+    vec4 faced = vec4(0.5 + 0.5 * (label.surface >= 0 ? normal : vec3(0, 0, 1)), 0.0);
 #if GLASS
     float bare = 1.0 - covered / float(COUNT);
     vec4 far = texelFetch(behind, pixel, 0), far_albedo = texelFetch(behind_albedo, pixel, 0);
@@ -198,12 +202,12 @@ void main() {
     if (label.surface < 0) {
         light.a = far.a;
         labels.a = far_albedo.a;
-        facing = texelFetch(behind_normal, pixel, 0);
+        faced = texelFetch(behind_normal, pixel, 0);
     }
 #endif
     WRITE(out_radiance, pixel, light);
     WRITE(out_albedo, pixel, labels);
-    WRITE(out_normal, pixel, facing);
+    WRITE(out_normal, pixel, faced);
 #if OWN == 0
     MARK(pixel, missing);
 #endif
