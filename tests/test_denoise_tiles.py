@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
@@ -11,6 +12,7 @@ import pytest
 torch = pytest.importorskip("torch")
 
 from fsid.denoise import Denoiser, ModelCard, NetworkConfig, RawDenoiser, denoise_raw  # noqa: E402
+from fsid.denoise.nafnet import SpatialMean  # noqa: E402
 from fsid.errors import FsidError  # noqa: E402
 from fsid.sensor import CFA_PATTERNS, NoiseLevel, Raw, load_profile  # noqa: E402
 
@@ -85,7 +87,7 @@ def test_a_small_image_is_what_the_bare_network_makes_of_it(rng: np.random.Gener
 
 
 def test_threads_may_share_a_network(rng: np.random.Generator) -> None:
-    """Averages are held on the network itself: those of one image must not get into another's tiles."""
+    """Those averages of one image must not get into another's tiles."""
     model = denoiser()
     images = [replace(raw(rng, 96, 96), mosaic=share * raw(rng, 96, 96).mosaic) for share in (1.0, 0.5, 0.1)]
     expected = [denoise_raw(image, model, tile_px=8).mosaic for image in images]
@@ -93,6 +95,27 @@ def test_threads_may_share_a_network(rng: np.random.Generator) -> None:
         found = list(threads.map(lambda image: denoise_raw(image, model, tile_px=8).mosaic, images))
     for mosaic, alone in zip(found, expected, strict=True):
         np.testing.assert_array_equal(mosaic, alone)
+
+
+def test_a_network_may_be_called_while_another_thread_denoises(rng: np.random.Generator) -> None:
+    """After each block, so while averages are taken and while they are held: neither sees the other."""
+    model, image = denoiser(), raw(rng, 96, 96)
+    packed = torch.from_numpy(rng.random((1, 4, 24, 24), dtype=np.float32))
+    other_image = packed, torch.tensor([LEVEL.k]), torch.tensor([LEVEL.sigma2])
+    expected, alone = model.net(*other_image), denoise_raw(image, model, tile_px=16).mosaic
+    found = []
+
+    def meanwhile(*_: object) -> None:
+        if threading.current_thread() is threading.main_thread():
+            found.append(other.submit(model.net, *other_image).result())
+
+    with ThreadPoolExecutor(1) as other:
+        for module in model.net.modules():
+            if isinstance(module, SpatialMean):
+                module.register_forward_hook(meanwhile)
+        beside = denoise_raw(image, model, tile_px=16).mosaic
+    assert all(torch.equal(output, expected) for output in found)
+    np.testing.assert_array_equal(beside, alone)
 
 
 def test_progress_counts_tiles(rng: np.random.Generator) -> None:

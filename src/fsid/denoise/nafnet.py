@@ -50,12 +50,26 @@ class SimpleGate(nn.Module):
 
 
 class SpatialMean(nn.Module):
-    """(B, C, H, W) -> (B, C, 1, 1) mean, or the constant `frozen` of shape (1, C, 1, 1)."""
-
-    frozen: Tensor | None = None
+    """(B, C, H, W) -> (B, C, 1, 1) mean, or what stands for it in this thread."""
 
     def forward(self, x: Tensor) -> Tensor:
-        return x.mean((2, 3), keepdim=True) if self.frozen is None else self.frozen
+        return _here.mean(self, x)
+
+
+def _mean(_: SpatialMean, x: Tensor) -> Tensor:
+    return x.mean((2, 3), keepdim=True)
+
+
+class _Here(threading.local):
+    """How this thread takes means: threads share a network, whose modules hold nothing of one image.
+
+    torch.compile traces through it, not through a ContextVar.
+    """
+
+    mean: Callable[[SpatialMean, Tensor], Tensor] = staticmethod(_mean)
+
+
+_here = _Here()
 
 
 class NAFBlock(nn.Module):
@@ -148,44 +162,39 @@ def receptive_radius(encoder: tuple[int, ...], middle: int, decoder: tuple[int, 
     return radius + 2
 
 
-_POOLING = threading.RLock()
-"""Hooks and constants are set on the modules themselves, which threads that share a network share too."""
-
-
 def spatial_means(net: nn.Module) -> list[SpatialMean]:
     """All of them, in the order in which the blocks were made."""
     return [module for module in net.modules() if isinstance(module, SpatialMean)]
 
 
 def pooling(net: nn.Module, run: Callable[[], object]) -> list[Tensor]:
-    """What the spatial means of `net` gave during the one call in `run()`, (B, C, 1, 1) each.
-
-    One thread at a time, as `frozen_pooling`.
-    """
-    means = spatial_means(net)
+    """What the spatial means of `net` gave during the one call in `run()`, (B, C, 1, 1) each."""
     seen: dict[SpatialMean, Tensor] = {}
-    with _POOLING:
-        hooks = [mean.register_forward_hook(lambda m, _, out: seen.update({m: out})) for mean in means]
-        try:
-            run()
-        finally:
-            for hook in hooks:
-                hook.remove()
-    return [seen[mean] for mean in means]
+
+    def seeing(mean: SpatialMean, x: Tensor) -> Tensor:
+        seen[mean] = _mean(mean, x)
+        return seen[mean]
+
+    with _meaning(seeing):
+        run()
+    return [seen[mean] for mean in spatial_means(net)]
 
 
 @contextmanager
 def frozen_pooling(net: nn.Module, constants: Sequence[Tensor]) -> Iterator[None]:
     """Inside this context the spatial means of `net` are `constants`, (1, C, 1, 1) each, see `pooling`.
 
-    One thread at a time: another one waits here until this one is done.
+    In this thread: others may use `net` meanwhile.
     """
-    means = spatial_means(net)
-    with _POOLING:
-        try:
-            for mean, constant in zip(means, constants, strict=True):
-                mean.frozen = constant
-            yield
-        finally:
-            for mean in means:
-                mean.frozen = None
+    frozen = dict(zip(spatial_means(net), constants, strict=True))
+    with _meaning(lambda mean, x: frozen[mean] if mean in frozen else _mean(mean, x)):
+        yield
+
+
+@contextmanager
+def _meaning(mean: Callable[[SpatialMean, Tensor], Tensor]) -> Iterator[None]:
+    before, _here.mean = _here.mean, mean
+    try:
+        yield
+    finally:
+        _here.mean = before
