@@ -18,11 +18,12 @@ onnxruntime = pytest.importorskip("onnxruntime")
 from fsid.cli.main import main  # noqa: E402
 from fsid.config import to_plain  # noqa: E402
 from fsid.denoise import Denoiser, ModelCard, NetworkConfig, RawDenoiser, denoise_raw, save_model  # noqa: E402
+from fsid.denoise.export import export  # noqa: E402
 from fsid.denoise.onnx_denoiser import OnnxDenoiser, load_onnx, onnx_denoiser  # noqa: E402
 from fsid.denoise.onnx_export import onnx_bytes, onnx_model  # noqa: E402
 from fsid.denoise.quality import probes  # noqa: E402
 from fsid.errors import FsidError  # noqa: E402
-from fsid.sensor import Raw, load_profile, read_raw, write_dng  # noqa: E402
+from fsid.sensor import NoiseLevel, Raw, load_profile, read_raw, write_dng  # noqa: E402
 
 NETWORK = NetworkConfig(width=4, encoder_blocks=(1, 1), middle_blocks=1, decoder_blocks=(1, 1))
 LEVEL = load_profile("pixel6").level(3200)
@@ -64,6 +65,25 @@ def test_whole_and_in_tiles_it_equals_pytorch(
         np.testing.assert_allclose(
             denoise_raw(raw, network, tile_px=tile_px).mosaic, expected, atol=1e-4, rtol=0
         )
+
+
+def test_an_image_without_noise_is_what_pytorch_makes_of_it(
+    rng: np.random.Generator, denoiser: Denoiser, network: OnnxDenoiser
+) -> None:
+    raw = replace(noisy_raw(rng, 34, 66), noise=NoiseLevel((0.0,) * 4, (0.0,) * 4))
+    expected = denoise_raw(raw, denoiser).mosaic
+    np.testing.assert_allclose(denoise_raw(raw, network).mosaic, expected, atol=1e-6, rtol=0)
+
+
+def test_an_export_that_fails_without_noise_is_refused(
+    denoiser: Denoiser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With a floor of 0 nothing differs at the levels of a camera."""
+    save_model(tmp_path / "model.safetensors", denoiser.net.state_dict(), denoiser.card)
+    monkeypatch.setattr("fsid.denoise.stabilise._READ_FLOOR", 0.0)
+    with pytest.raises(FsidError, match="NaN"):
+        export(tmp_path / "model.safetensors", tmp_path / "model.onnx")
+    assert not (tmp_path / "model.onnx").exists()
 
 
 def test_the_graph_alone_is_enough(rng: np.random.Generator, denoiser: Denoiser, exported: bytes) -> None:

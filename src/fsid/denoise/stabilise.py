@@ -23,7 +23,7 @@ _READ_FLOOR = 1e-12  # keeps k = sigma2 = 0, a noise-free image, finite: far bel
 
 
 def _black_variance(k: Tensor, sigma2: Tensor) -> Tensor:
-    return sigma2 + 0.375 * k * k + _READ_FLOOR
+    return (sigma2 + 0.375 * k * k).clamp(min=_READ_FLOOR)  # the ONNX exporter drops so small a summand
 
 
 def stabilise(x: Tensor, k: Tensor, sigma2: Tensor) -> Tensor:
