@@ -8,11 +8,13 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import nullcontext
 from dataclasses import replace
+from functools import partial
 from importlib.resources import as_file, files
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -311,6 +313,39 @@ def test_a_training_leaves_pytorch_as_it_was(ends: bool, data: Path, tmp_path: P
         train(data, tmp_path / "run", config, quiet=ends, progress=None if ends else interrupted_after(1))
     assert torch.get_num_threads() == threads
     assert torch.equal(torch.get_rng_state(), state)
+
+
+@pytest.fixture
+def accelerate() -> Iterator[ModuleType]:
+    """As a process finds it that has made no Accelerator yet."""
+    module = pytest.importorskip("accelerate")
+    module.state.AcceleratorState._reset_state(reset_partial_state=True)
+    module.state.GradientState._reset_state()
+    yield module
+    module.state.AcceleratorState._reset_state(reset_partial_state=True)
+    module.state.GradientState._reset_state()
+
+
+def test_an_accelerator_of_one_s_own_is_as_it_was(accelerate: ModuleType, data: Path, tmp_path: Path) -> None:
+    """Amidst its accumulation of gradients, in which FSID's own steps are not skipped."""
+    expected = train(data, tmp_path / "alone", CONFIG, quiet=True).read_bytes()
+    own = accelerate.Accelerator(cpu=True, gradient_accumulation_steps=4)
+    net = own.prepare(torch.nn.Linear(2, 2))
+    with own.accumulate(net):
+        assert not own.sync_gradients
+    assert train(data, tmp_path / "beside", CONFIG, quiet=True).read_bytes() == expected
+    assert own.gradient_accumulation_steps == 4
+    assert not own.sync_gradients
+
+
+@pytest.mark.parametrize("is_before", [True, False])
+def test_an_accelerator_of_one_s_own_may_have_another_precision(
+    is_before: bool, accelerate: ModuleType, data: Path, tmp_path: Path
+) -> None:
+    make = partial(accelerate.Accelerator, cpu=True, mixed_precision="bf16")
+    before = make() if is_before else None
+    train(data, tmp_path / "run", replace(CONFIG, steps=1), quiet=True)
+    assert (before or make()).mixed_precision == "bf16"
 
 
 def test_a_folder_is_one_training_s_at_a_time(data: Path, tmp_path: Path) -> None:

@@ -23,6 +23,7 @@ from pathlib import Path
 import numpy as np
 import torch
 from accelerate import Accelerator
+from accelerate.state import AcceleratorState, GradientState, PartialState
 from rich.console import Console
 from rich.text import Text
 from torch import Tensor
@@ -51,17 +52,27 @@ SELECTED = "psnr_scenes"  # which validation chooses the best network
 
 
 @contextmanager
-def _torch_as_it_was() -> Iterator[None]:
-    """PyTorch's number of threads and its random numbers on the CPU are afterwards what they were."""
+def _all_as_it_was() -> Iterator[None]:
+    """PyTorch's threads and random numbers on the CPU, and what all Accelerators of a process share.
+
+    Inside, an Accelerator is the first of its process.
+    """
     threads = torch.get_num_threads()
+    shared = [state._shared_state for state in (PartialState, AcceleratorState, GradientState)]
+    before = [dict(values) for values in shared]
     try:
+        for values in shared:
+            values.clear()
         with torch.random.fork_rng(devices=()):
             yield
     finally:
         torch.set_num_threads(threads)
+        for values, old in zip(shared, before, strict=True):
+            values.clear()
+            values.update(old)
 
 
-@_torch_as_it_was()
+@_all_as_it_was()
 def train(
     data_dir: str | Path,
     run_dir: str | Path,
@@ -79,7 +90,8 @@ def train(
     record of the run. progress(done, steps) is called in place of the live line. Under `torchrun` or
     `accelerate launch` each process draws batches of its own and gradients are averaged. Raises FsidError for
     unusable data or settings, another run in `run_dir`, another process at work there, or a training that
-    diverges. PyTorch's number of threads and its random numbers on the CPU are afterwards what they were.
+    diverges. PyTorch's number of threads, its random numbers on the CPU and an Accelerator of your own are
+    afterwards what they were.
     """
     data_dir, run_dir = Path(data_dir), Path(run_dir)
     config = sizes_as_begun(run_dir, as_read(config, source="config"))
