@@ -212,24 +212,35 @@ def test_the_best_network_on_held_out_scenes_is_kept(tmp_path: Path, monkeypatch
     assert watch.measure(best)["psnr_scenes"] == pytest.approx(max(scores), abs=1e-9)
 
 
-def test_a_dataset_that_grew_is_judged_by_what_it_holds_out_now(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("is_older", [False, True])
+def test_what_a_run_holds_out_stays_so_when_its_dataset_grows(
+    is_older: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The network before was measured on other images, and easier ones here."""
+    """Of five pictures the last is held out, and its second pair is not trained on.
+
+    A run of an older version holds out what is last now, and does not compare it with what was.
+    """
     scores = iter([50.0, 40.0])
     monkeypatch.setattr(Validation, "measure", lambda self, weights: {"psnr_scenes": next(scores)})
     folder, run, rng = tmp_path / "data", tmp_path / "run", np.random.default_rng(3)
     folder.mkdir()
-    samples = [stored(rng, number) for number in range(10)]
+    samples = [stored(rng, number) for number in range(9)]
     write_shard(shard_path(folder, 0), samples[:5])
+    save_settings(DatasetConfig(0, 5, GenerateConfig(), pictures=5), folder / "config.yaml")
     config = replace(CONFIG, held_out=1, validate_every=4)
 
     with pytest.raises(KeyboardInterrupt):
         train(folder, run, config, progress=stop_at_five)
+    if is_older:
+        sessions = json.loads((run / "sessions.json").read_text())
+        (run / "sessions.json").write_text(json.dumps([{**row, "held_out": None} for row in sessions]))
     write_shard(shard_path(folder, 1), samples[5:])
-    card = load_denoiser(train(folder, run, config, quiet=True)).card
-    row = {"step": 8, "held_out": 1, "held_out_from": 9, "psnr_scenes": 40.0}
-    assert card.details["validation"] == [row]
+    train(folder, run, config, quiet=True)
+    last, best = (load_denoiser(run / name).card for name in ("last.safetensors", "model.safetensors"))
+    assert last.training.startswith(f"{7 if is_older else 8} images")
+    row = {"step": 8, "held_out": 1, "held_out_from": 8 if is_older else 4, "psnr_scenes": 40.0}
+    assert last.details["validation"] == [row]
+    assert best.details["validation"][0]["psnr_scenes"] == (40.0 if is_older else 50.0)
 
 
 def test_a_run_keeps_the_sizes_that_it_was_begun_with(data: Path, tmp_path: Path) -> None:

@@ -464,6 +464,7 @@ def test_validation_scenes_and_held_out_ones_are_not_drawn(dataset: Path) -> Non
     save_settings(DatasetConfig(0, 2, pairs), dataset / "config.yaml")
     assert [mosaic.scene for mosaic in index_mosaics(dataset)] == [0, 0, 1, 1]
     assert PatchDataset(dataset, replace(CONFIG, held_out=1), seed=0).mosaics == 2
+    assert PatchDataset(dataset, CONFIG, seed=0, without={0, 9}).mosaics == 2
 
 
 def test_the_table_of_levels_is_the_profile(rng: np.random.Generator) -> None:

@@ -30,7 +30,7 @@ from __future__ import annotations
 
 import operator
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
@@ -103,8 +103,9 @@ class PatchDataset(Dataset[Batch]):
     """`dataset[step]` is the batch of that step; see the module docstring. Validation scenes are left out.
 
     `feed.batches` has other processes make them. rank, world: this process among those that train together;
-    None asks `torch.distributed`, and is 0 of 1 where that was not set up. FsidError: a negative seed or
-    step, and what is wrong with the data or the configuration.
+    None asks `torch.distributed`, and is 0 of 1 where that was not set up. without: numbers of scenes to
+    leave out as well. FsidError: a negative seed or step, and what is wrong with the data or the
+    configuration.
     """
 
     def __init__(
@@ -114,6 +115,7 @@ class PatchDataset(Dataset[Batch]):
         seed: int,
         rank: int | None = None,
         world: int | None = None,
+        without: Collection[int] = (),
     ) -> None:
         data_dir = Path(data_dir)
         if not config.profiles:
@@ -127,7 +129,7 @@ class PatchDataset(Dataset[Batch]):
             raise FsidError(
                 f"rank {self._rank}: is not one of the {self._world} processes that train together"
             )
-        self._mosaics = _training_mosaics(data_dir, config)
+        self._mosaics = _training_mosaics(data_dir, config, without)
         self._noisy = _noisy_of(data_dir, self._mosaics) if config.noise == "stored" else {}
         self._profiles = [load_bayer_profile(name) for name in config.profiles]
         self._levels = LevelTable(self._profiles, (config.iso_min, config.iso_max))
@@ -259,11 +261,13 @@ def _transposed(level: NoiseLevel) -> NoiseLevel:
     return NoiseLevel(swapped(level.k), swapped(level.sigma2))
 
 
-def _training_mosaics(data_dir: Path, config: PatchConfig) -> tuple[StoredMosaic, ...]:
+def _training_mosaics(
+    data_dir: Path, config: PatchConfig, without: Collection[int]
+) -> tuple[StoredMosaic, ...]:
     found = index_mosaics(data_dir)
     if not 0 <= config.held_out < len(found):
         raise FsidError(f"{data_dir}: has {len(found)} images; held_out {config.held_out} leaves none")
-    held_out = {mosaic.scene for mosaic in found[len(found) - config.held_out :]}
+    held_out = {*without, *(mosaic.scene for mosaic in found[len(found) - config.held_out :])}
     kept = tuple(m for m in found if m.split == "train" and m.scene not in held_out)
     if not kept:
         raise FsidError(f"{data_dir}: all its images are for validation; generate more scenes")

@@ -24,6 +24,12 @@ def sizes_as_begun(run_dir: Path, config: TrainConfig) -> TrainConfig:
     return replace(config, shrink=_begun_with(file).shrink)
 
 
+def held_out_as_begun(run_dir: Path) -> list[str] | None:
+    """Keys of the images that the run in `run_dir` holds out since it began; None where it says none yet."""
+    rows = read_sessions(run_dir) if has_network(run_dir) else []
+    return next((row["held_out"] for row in rows if isinstance(row.get("held_out"), list)), None)
+
+
 def _begun_with(file: Path) -> TrainConfig:
     """The settings in the file of a run; before there was `shrink`, images were drawn as they are."""
     there = load_settings(TrainConfig, file)

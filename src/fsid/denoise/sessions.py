@@ -1,8 +1,9 @@
 """Under what circumstances a network was trained: command, hardware and time, one row per start of the run.
 
-    sessions.json = [{command, hardware, processes, data, first_step, last_step, seconds}, ...]
+    sessions.json = [{command, hardware, processes, data, held_out, first_step, last_step, seconds}, ...]
 
-`data` is the identity of the dataset, absent in older runs.
+`data` is the identity of the dataset, `held_out` the keys of its images that are for validation: those of a
+run's beginning stay so when the dataset grows. Both are absent in older runs.
 
 They stand apart from checkpoint and model, which hold what follows from settings and seed alone and so are
 the same bits on every run. A row is brought up to date with every checkpoint: what a kill loses of the
@@ -15,6 +16,7 @@ import json
 import os
 import platform
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -28,11 +30,25 @@ SESSIONS_FILE = "sessions.json"
 class Session:
     """The row of a run that starts now at `first_step`. data: `fsid.dataset.index.identity`."""
 
-    def __init__(self, run_dir: Path, command: str, first_step: int, processes: int, data: str) -> None:
+    def __init__(
+        self,
+        run_dir: Path,
+        command: str,
+        first_step: int,
+        processes: int,
+        data: str,
+        held_out: Sequence[str],
+    ) -> None:
         self._path, self._start = run_dir / SESSIONS_FILE, time.monotonic()
         self._before = read_sessions(run_dir)
         self._first_step = first_step
-        self._row = {"command": command, "hardware": hardware(), "processes": processes, "data": data}
+        self._row = {
+            "command": command,
+            "hardware": hardware(),
+            "processes": processes,
+            "data": data,
+            "held_out": list(held_out),
+        }
 
     def save(self, step: int) -> None:
         """Write the file, with the time until now; a session without a step leaves no row."""

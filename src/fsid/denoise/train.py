@@ -15,7 +15,7 @@ bits as an undisturbed one.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -30,7 +30,7 @@ from torch import Tensor
 
 from fsid.config import as_read, read_yaml, to_plain
 from fsid.dataset.feed import batches
-from fsid.dataset.index import identity, index_mosaics
+from fsid.dataset.index import StoredMosaic, identity, index_mosaics
 from fsid.dataset.loader import Batch, PatchConfig, PatchDataset
 from fsid.denoise.board import Board
 from fsid.denoise.checkpoint import TrainState, load_checkpoint, save_checkpoint
@@ -38,7 +38,7 @@ from fsid.denoise.initial import initial_network
 from fsid.denoise.live import LiveLine
 from fsid.denoise.model import MODEL_FILE, Denoiser, ModelCard, save_model
 from fsid.denoise.raw_denoiser import RawDenoiser
-from fsid.denoise.run_folder import CONFIG_FILE, prepare_run, sizes_as_begun
+from fsid.denoise.run_folder import CONFIG_FILE, held_out_as_begun, prepare_run, sizes_as_begun
 from fsid.denoise.sessions import Session, read_sessions
 from fsid.denoise.stabilise import stabilise
 from fsid.denoise.train_config import TrainConfig
@@ -100,8 +100,10 @@ def train(
     gpu = torch.cuda.is_available()
     accelerator = Accelerator(cpu=not gpu, mixed_precision="bf16" if gpu else "no")
     is_main = accelerator.is_main_process
-    kept = held_out(data_dir, config)
-    patches = PatchDataset(data_dir, _patch_config(config, len(kept)), config.seed, accelerator.process_index)
+    kept = held_out(data_dir, config, held_out_as_begun(run_dir))
+    scenes = {mosaic.scene for mosaic in kept}
+    rank = accelerator.process_index
+    patches = PatchDataset(data_dir, _patch_config(config), config.seed, rank, without=scenes)
     config = replace(config, shrink=patches.shrink)
     if resume and is_main and not (run_dir / CONFIG_FILE).is_file():
         raise FsidError(f"{run_dir}: holds no training to resume")
@@ -120,7 +122,7 @@ def train(
         feed = batches(patches, range(state.step, config.steps), config.loader_processes, pin=gpu)
         with LiveLine(config, state.step, accelerator.num_processes, quiet=not shown) as live:
             card = _card(data_dir, config, patches.mosaics, initial)
-            keeper = _Keeper(data_dir, run_dir, config, accelerator, card, command, state, live)
+            keeper = _Keeper(data_dir, run_dir, config, kept, accelerator, card, command, state, live)
             for batch in feed:
                 rate = learning_rate(config, state.step)
                 loss, psnr = _step(accelerator, forward, net, optimizer, batch, rate, config)
@@ -145,6 +147,7 @@ class _Keeper:
         data_dir: Path,
         run_dir: Path,
         config: TrainConfig,
+        kept: Sequence[StoredMosaic],
         accelerator: Accelerator,
         card: ModelCard,
         command: str,
@@ -153,11 +156,19 @@ class _Keeper:
     ) -> None:
         main = accelerator.is_main_process
         self._run_dir, self._config, self._state, self._live = run_dir, config, state, live
-        kept = held_out(data_dir, config) if main else ()
-        self._validation = validation(kept, config, accelerator.device)
-        self._held_out = {"held_out": len(kept), "held_out_from": len(index_mosaics(data_dir)) - len(kept)}
+        self._validation = validation(kept if main else (), config, accelerator.device)
+        keys = [mosaic.key for mosaic in index_mosaics(data_dir)]
+        first = keys.index(kept[0].key) if kept else len(keys)
+        self._held_out = {"held_out": len(kept), "held_out_from": first}
         self._card = card
-        self._session = Session(run_dir, command, state.step, accelerator.num_processes, identity(data_dir))
+        self._session = Session(
+            run_dir,
+            command,
+            state.step,
+            accelerator.num_processes,
+            identity(data_dir),
+            [mosaic.key for mosaic in kept],
+        )
         self._board = Board(run_dir, state.step, wanted=config.tensorboard and main)
 
     def after_step(
@@ -193,17 +204,17 @@ class _Keeper:
             self._live.validated(figures[SELECTED])
 
     def _comparable(self) -> list[float]:
-        """PSNR of networks before on the images held out now: a dataset that grew holds out others."""
+        """PSNR of networks before on the images held out now: older runs held out others of grown data."""
         held_out = self._held_out.items()
         rows = [row for row in self._state.validation if all(row.get(key, n) == n for key, n in held_out)]
         return [row[SELECTED] for row in rows if SELECTED in row]
 
     def _save(self, net: torch.nn.Module, optimizer: torch.optim.Optimizer) -> None:
         state = self._state
+        self._session.save(state.step)  # first: where there is a checkpoint, it says what the run holds out
         save_checkpoint(self._run_dir, state, net, optimizer)
         for file, rows in ((HISTORY_FILE, state.history), (VALIDATION_FILE, state.validation)):
             write_atomically(self._run_dir / file, json.dumps(rows, indent=0).encode())
-        self._session.save(state.step)
 
     def _model(self, name: str) -> None:
         state = self._state
@@ -264,18 +275,18 @@ def mean_psnr(estimate: Tensor, clean: Tensor) -> Tensor:
 
 
 def _note_nothing_held_out(data_dir: Path) -> None:
-    line = f"note: {data_dir} holds fewer than five images: none is held out for validation, and {MODEL_FILE}"
-    Console(stderr=True).print(Text(f"{line} is the network at the last step"), soft_wrap=True)
+    why = f"{data_dir}: none is held out for validation, which takes five images when a training begins"
+    line = f"note: {why}; {MODEL_FILE} is the network at the last step"
+    Console(stderr=True).print(Text(line), soft_wrap=True)
 
 
-def _patch_config(config: TrainConfig, held_out_images: int) -> PatchConfig:
+def _patch_config(config: TrainConfig) -> PatchConfig:
     return PatchConfig(
         size_px=config.patch_px,
         batch=config.batch,
         profiles=config.profiles,
         iso_min=config.iso_min,
         iso_max=config.iso_max,
-        held_out=held_out_images,
         shrink=config.shrink,
     )
 

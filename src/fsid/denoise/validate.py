@@ -9,7 +9,7 @@ so that a network "trained on scenes alone" is not chosen by photographs either.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -67,9 +67,13 @@ class Validation:
         return float(-10 * torch.log10(error.square().mean() + 1e-12))
 
 
-def held_out(data_dir: Path, config: TrainConfig) -> tuple[StoredMosaic, ...]:
-    """The last `config.held_out` images of `data_dir`, at most a fifth of it."""
+def held_out(
+    data_dir: Path, config: TrainConfig, keys: Collection[str] | None = None
+) -> tuple[StoredMosaic, ...]:
+    """The images of `data_dir` with these keys; None: its last `config.held_out`, at most a fifth of it."""
     mosaics = index_mosaics(data_dir)
+    if keys is not None:
+        return tuple(mosaic for mosaic in mosaics if mosaic.key in keys)
     return mosaics[len(mosaics) - min(config.held_out, len(mosaics) // 5) :]
 
 
