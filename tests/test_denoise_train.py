@@ -395,6 +395,20 @@ def test_settings_made_in_python_go_on(data: Path, tmp_path: Path) -> None:
     train(data, tmp_path / "run", config, quiet=True)
 
 
+def test_a_run_goes_on_with_settings_that_change_nothing(data: Path, tmp_path: Path) -> None:
+    whole, stopped = tmp_path / "whole", tmp_path / "stopped"
+    train(data, whole, CONFIG, quiet=True)
+    with pytest.raises(KeyboardInterrupt):
+        train(data, stopped, CONFIG, progress=stop_at_five)
+    other = replace(CONFIG, checkpoint_every=3, loader_processes=1, tensorboard=True)
+    train(data, stopped, other, quiet=True)
+    assert load_settings(TrainConfig, stopped / "config.yaml") == replace(other, shrink=(1,))
+    expected, weights = (load_file(run / "last.safetensors") for run in (whole, stopped))
+    assert all(torch.equal(weights[name], expected[name]) for name in expected)
+    with pytest.raises(FsidError, match="another threads;"):
+        train(data, stopped, replace(CONFIG, threads=2), quiet=True)
+
+
 @pytest.mark.parametrize("has_settings", [True, False])
 def test_a_run_stays_with_its_dataset(has_settings: bool, tmp_path: Path) -> None:
     def dataset(name: str, seed: int, shards: int = 1) -> Path:

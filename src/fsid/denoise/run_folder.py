@@ -14,6 +14,8 @@ from fsid.denoise.train_config import TrainConfig
 from fsid.errors import FsidError
 
 CONFIG_FILE = "config.yaml"
+_WITHOUT_EFFECT = {"checkpoint_every", "loader_processes", "tensorboard"}
+"""Settings that change no bit of a network: a run goes on with others."""
 
 
 def sizes_as_begun(run_dir: Path, config: TrainConfig) -> TrainConfig:
@@ -39,26 +41,33 @@ def _begun_with(file: Path) -> TrainConfig:
 def prepare_run(data_dir: Path, run_dir: Path, config: TrainConfig, initial: Denoiser | None) -> None:
     """`run_dir` is of `config` and data, whatever a run that failed before its first network left there."""
     file = run_dir / CONFIG_FILE
-    there = _begun_with(file) if file.is_file() else None
-    if there is not None and has_network(run_dir):
-        old, new = to_plain(there), to_plain(config)
-        if changed := [key for key in new if new[key] != old[key]]:
-            raise FsidError(
-                f"{file}: this run was started with another {', '.join(changed)}; "
-                "continue it with its own settings or give another folder"
-            )
-        data = identity(data_dir)
-        if any(row.get("data", data) != data for row in read_sessions(run_dir)):
-            raise FsidError(
-                f"{run_dir}: this run was started on other data than {data_dir}; "
-                "continue it with its own dataset or give another folder"
-            )
-        return
+    there = _begun_with(file) if file.is_file() else None  # FsidError where the file is of something else
+    is_begun = there is not None and has_network(run_dir)
+    if there is not None and is_begun:
+        _check_same_run(data_dir, run_dir, there, config)
     try:
-        run_dir.mkdir(parents=True, exist_ok=True)
-        drop_initial(run_dir)  # first: it may be of other settings
-        save_settings(config, file)
-        if initial is not None:
+        if not is_begun:
+            run_dir.mkdir(parents=True, exist_ok=True)
+            drop_initial(run_dir)  # first: it may be of other settings
+        if there != config:
+            save_settings(config, file)
+        if initial is not None and not is_begun:
             keep_initial(run_dir, initial)
     except OSError as error:
         raise FsidError(f"{run_dir}: cannot be written ({error.strerror})") from None
+
+
+def _check_same_run(data_dir: Path, run_dir: Path, there: TrainConfig, config: TrainConfig) -> None:
+    """FsidError where another training is in `run_dir` than that of `config` on `data_dir`."""
+    old, new = to_plain(there), to_plain(config)
+    if changed := [key for key in new if new[key] != old[key] and key not in _WITHOUT_EFFECT]:
+        raise FsidError(
+            f"{run_dir / CONFIG_FILE}: this run was started with another {', '.join(changed)}; "
+            "continue it with its own settings or give another folder"
+        )
+    data = identity(data_dir)
+    if any(row.get("data", data) != data for row in read_sessions(run_dir)):
+        raise FsidError(
+            f"{run_dir}: this run was started on other data than {data_dir}; "
+            "continue it with its own dataset or give another folder"
+        )

@@ -86,12 +86,12 @@ def train(
     """Train on `data_dir`'s shards; config, checkpoint, history, models go to `run_dir`. Path of the best.
 
     A run that is in `run_dir` already goes on from its checkpoint; it must have been started with the same
-    config and dataset, which may have grown or moved. resume: insist that there is one. command: for the
-    record of the run. progress(done, steps) is called in place of the live line. Under `torchrun` or
-    `accelerate launch` each process draws batches of its own and gradients are averaged. Raises FsidError for
-    unusable data or settings, another run in `run_dir`, another process at work there, or a training that
-    diverges. PyTorch's number of threads, its random numbers on the CPU and an Accelerator of your own are
-    afterwards what they were.
+    config, but for what changes no bit (`run_folder`), and dataset, which may have grown or moved. resume:
+    insist that there is one. command: for the record of the run. progress(done, steps) is called in place of
+    the live line. Under `torchrun` or `accelerate launch` each process draws batches of its own and gradients
+    are averaged. Raises FsidError for unusable data or settings, another run in `run_dir`, another process at
+    work there, or a training that diverges. PyTorch's number of threads, its random numbers on the CPU and an
+    Accelerator of your own are afterwards what they were.
     """
     data_dir, run_dir = Path(data_dir), Path(run_dir)
     config = sizes_as_begun(run_dir, as_read(config, source="config"))
