@@ -510,6 +510,9 @@ def test_noise_far_beyond_the_profile_is_said_once_per_run(
 
 
 def test_a_profile_without_colour_filters_is_refused(tmp_path: Path) -> None:
-    save_profile(tmp_path / "mono.yaml", replace(load_profile("pixel6"), cfa="MONO"))
+    mono = replace(load_profile("pixel6"), cfa="MONO")
+    save_profile(tmp_path / "mono.yaml", mono)
     with pytest.raises(FsidError, match=r"mono\.yaml: is of a sensor without colour filters"):
         noise_of(noisy_raw(), str(tmp_path / "mono.yaml"), 800, tmp_path)
+    with pytest.raises(FsidError, match="profile pixel6: is of a sensor without colour filters"):
+        fsid.denoise(noisy_raw(), mono, iso=800)

@@ -13,6 +13,7 @@ from fsid.denoise.model import load_denoiser, model_path
 from fsid.denoise.onnx_denoiser import load_onnx, onnx_denoiser
 from fsid.errors import FsidError
 from fsid.sensor import CameraProfile, Raw, clean_levels
+from fsid.sensor.profiles import check_bayer
 
 Backend = Literal["torch", "onnx"]
 
@@ -55,6 +56,7 @@ def denoise(
     """
     network = load_model(model) if model is None or isinstance(model, str | Path) else model
     if isinstance(profile, CameraProfile):
+        check_bayer(profile, f"profile {profile.name}")
         level = profile.level(raw.iso if iso is None else iso)
     else:
         level = noise_of(raw, None if profile is None else str(profile), iso, Path(raw.camera)).level

@@ -70,11 +70,14 @@ def load_profile(name_or_path: str | Path) -> CameraProfile:
 def load_bayer_profile(name_or_path: str | Path) -> CameraProfile:
     """`load_profile` of a camera that makes mosaics; FsidError where it has no colour filters."""
     profile = load_profile(name_or_path)
-    if profile.cfa == MONO:
-        raise FsidError(
-            f"{name_or_path}: is of a sensor without colour filters; give a Bayer camera's profile"
-        )
+    check_bayer(profile, str(name_or_path))
     return profile
+
+
+def check_bayer(profile: CameraProfile, source: str) -> None:
+    """FsidError, naming `source`, where the camera has no colour filters and so makes no mosaics."""
+    if profile.cfa == MONO:
+        raise FsidError(f"{source}: is of a sensor without colour filters; give a Bayer camera's profile")
 
 
 def far_extrapolated(names: Iterable[str | Path], iso_min: float, iso_max: float) -> Iterator[CameraProfile]:
