@@ -61,6 +61,7 @@ def test_training(data: str, tmp_path: Path):
         save_model,
         train,
     )
+    from fsid.denoise.export import export
 
     assert PatchDataset(data, PatchConfig(8, 2, ("pixel6",), 400, 800), 0).mosaics == 2
     network = NetworkConfig(width=4, encoder_blocks=(1,), decoder_blocks=(1,))
@@ -78,3 +79,5 @@ def test_training(data: str, tmp_path: Path):
     model = load_model(run)
     save_model(str(tmp_path / "own.safetensors"), model.net.state_dict(), model.card)
     assert load_model(str(tmp_path / "own.safetensors")).card == model.card
+    own = export(run, str(tmp_path / "exported.safetensors"), "float32").file
+    assert load_model(str(own)).card == model.card

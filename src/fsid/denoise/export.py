@@ -44,14 +44,14 @@ class Export:
     difference: float
 
 
-def export(run: str | Path | None, file: Path, precision: Precision | None = None) -> Export:
+def export(run: str | Path | None, file: str | Path, precision: Precision | None = None) -> Export:
     """Write the network of `run` (see `load_model`) to `file`, .onnx or .safetensors.
 
     precision: None is float32 for .onnx, and for .safetensors float16 where that costs less than
     `HALF_LIMIT_DB`. FsidError: no such network, another suffix or precision, the network itself as `file`, a
     result that does not agree.
     """
-    path = model_path(run)
+    path, file = model_path(run), Path(file)
     suffix = file.suffix.lower()
     if suffix not in (".onnx", ".safetensors"):
         raise FsidError(f"{file}: a network is exported as .onnx or .safetensors")
