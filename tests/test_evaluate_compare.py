@@ -116,6 +116,17 @@ def test_a_method_may_work_in_place(small_set: Path):
     assert [row for row in rows if row.model == "noisy"] == list(alone)
 
 
+def test_all_methods_are_developed_with_the_same_colours(small_set: Path):
+    """Those of the capture, whatever a method makes of them in its result or in its copy."""
+
+    def recoloured(raw: Raw) -> Raw:
+        raw.xyz_to_camera[:] = np.eye(3)
+        return dataclasses.replace(raw, white_balance=(9.0, 1.0, 3.0), black_level=0, white_level=9)
+
+    expected, found = compare(small_set, [NOISY, Method("mine", "", recoloured)]).rows[::2]
+    assert (found.psnr_raw, found.psnr, found.ssim) == (expected.psnr_raw, expected.psnr, expected.ssim)
+
+
 @pytest.mark.parametrize(
     ("denoise", "words"),
     [

@@ -6,6 +6,7 @@ import csv
 import io
 import json
 from collections.abc import Callable, Iterable, Sequence
+from copy import deepcopy
 from dataclasses import asdict, astuple, dataclass, fields, replace
 from itertools import product
 from pathlib import Path
@@ -26,7 +27,8 @@ from fsid.sensor import Raw, develop, read_raw, upright
 class Method:
     """A denoiser under test. training: what it was trained on, in words ("" for the baselines).
 
-    denoise: may change what it is given, which is a copy; returns a finite Raw of the same size and CFA.
+    denoise: may change what it is given, which is a copy; returns a finite Raw of the same size and CFA, of
+    which the mosaic is measured: it is developed with the colours of what was given.
     """
 
     name: str
@@ -146,7 +148,7 @@ def _noisy(path: Path, truth: Raw) -> Raw:
 
 
 def _denoised(method: Method, frame: Raw) -> Raw:
-    result = method.denoise(replace(frame, mosaic=frame.mosaic.copy()))
+    result = method.denoise(deepcopy(frame))
     if not isinstance(result, Raw):
         kind = type(result).__name__
         raise FsidError(f"{method.name}: denoise returns a Raw, replace(raw, mosaic=...); got {kind}")
@@ -158,7 +160,7 @@ def _denoised(method: Method, frame: Raw) -> Raw:
         )
     if not np.isfinite(result.mosaic).all():
         raise FsidError(f"{method.name}: denoise makes NaN or infinity, which nothing can be measured of")
-    return result
+    return replace(frame, mosaic=result.mosaic)
 
 
 def detailed_window(srgb: np.ndarray, size_px: int) -> tuple[tuple[slice, slice], float]:
