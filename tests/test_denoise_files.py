@@ -400,6 +400,11 @@ def test_the_python_interface(noisy_file: Path, network: Path) -> None:
     assert fsid.develop(clean).shape == (256, 320, 3)
 
 
+def test_a_path_is_not_denoised_before_it_is_read() -> None:
+    with pytest.raises(FsidError, match="a str is no RAW image: give a Raw; read_raw reads one"):
+        fsid.denoise("photo.dng")
+
+
 def test_importing_the_package_imports_no_pytorch() -> None:
     script = "import sys, fsid; fsid.read_raw; sys.exit('torch' in sys.modules)"
     subprocess.run([sys.executable, "-c", script], check=True)

@@ -71,9 +71,10 @@ def denoise_raw(
     is removed, so that grain is left below 1; above 1 the noise is taken to be that many times as strong, up
     to a variance of `MAX_TOLD`, which smooths more. tile_px: side of a tile in packed pixels, overlap
     excluded; memory grows with it, the result does not depend on it. progress(done, tiles) is called after
-    each tile. Raises FsidError where the noise level is unknown or not physical, the strength below 0 or
-    above `MAX_STRENGTH`, the mosaic holds NaN or infinity, or the network makes such.
+    each tile. Raises FsidError where `raw` is no `Raw`, the noise level unknown or not physical, the strength
+    below 0 or above `MAX_STRENGTH`, the mosaic holds NaN or infinity, or the network makes such.
     """
+    check_raw(raw)
     level = level if level is not None else raw.noise
     _check(raw, level, strength, tile_px)
     assert level is not None
@@ -115,12 +116,19 @@ def _times(values: tuple[float, float, float, float], factor: float) -> tuple[fl
     return a, b, c, d
 
 
+def check_raw(raw: object) -> None:
+    """FsidError for a path or an array, of which nobody knows how to read it."""
+    if not isinstance(raw, Raw):
+        raise FsidError(f"a {type(raw).__name__} is no RAW image: give a Raw; read_raw reads one")
+
+
 def _check(raw: Raw, level: NoiseLevel | None, strength: float, tile_px: int) -> None:
     if level is None:
         raise FsidError(
             "the noise level of this RAW is unknown: give a profile and an ISO (--profile, --iso)"
         )
     check_strength(level, strength)
+    level.check()
     if not np.all(np.isfinite(raw.mosaic)):
         raise FsidError("this RAW holds NaN or infinity; read it again from its file")
     if tile_px < 1:

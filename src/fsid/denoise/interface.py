@@ -7,7 +7,7 @@ from typing import Literal
 
 import torch
 
-from fsid.denoise.denoise import Network, denoise_raw
+from fsid.denoise.denoise import Network, check_raw, denoise_raw
 from fsid.denoise.files import noise_of
 from fsid.denoise.model import load_denoiser, model_path
 from fsid.denoise.onnx_denoiser import load_onnx, onnx_denoiser
@@ -54,6 +54,7 @@ def denoise(
     `load_model`; load it once to denoise many images. strength: 0..1 is the share of the noise that is
     removed, above 1 smooths more. Raises FsidError.
     """
+    check_raw(raw)
     network = load_model(model) if model is None or isinstance(model, str | Path) else model
     if isinstance(profile, CameraProfile):
         check_bayer(profile, f"profile {profile.name}")
