@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import subprocess
 import sys
 from dataclasses import replace
@@ -20,6 +21,7 @@ from fsid.denoise import ModelCard, NetworkConfig, RawDenoiser, denoise_raw, loa
 from fsid.denoise import model as model_module  # noqa: E402
 from fsid.denoise.export import export  # noqa: E402
 from fsid.denoise.files import denoise_file, noise_of  # noqa: E402
+from fsid.denoise.interface import denoise  # noqa: E402
 from fsid.denoise.preview import PREVIEW_PX, preview_of  # noqa: E402
 from fsid.errors import FsidError  # noqa: E402
 from fsid.sensor import (  # noqa: E402
@@ -403,6 +405,13 @@ def test_the_python_interface(noisy_file: Path, network: Path) -> None:
 def test_a_path_is_not_denoised_before_it_is_read() -> None:
     with pytest.raises(FsidError, match="a str is no RAW image: give a Raw; read_raw reads one"):
         fsid.denoise("photo.dng")
+
+
+def test_the_call_of_the_package_describes_itself() -> None:
+    assert inspect.signature(fsid.denoise) == inspect.signature(denoise)
+    described = inspect.getdoc(fsid.denoise)
+    assert described is not None
+    assert described.startswith(str(inspect.getdoc(denoise)))
 
 
 def test_importing_the_package_imports_no_pytorch() -> None:

@@ -4,6 +4,8 @@
     clean = fsid.denoise(raw, "pixel6")       # fsid.denoise(raw): the noise level of the file, or the image's
     fsid.write_dng("clean.dng", clean)
 
+`denoise` is a package that can be called: `help(fsid.denoise)` says how, the functions below are the others.
+
 Data flows one way, and each step is a package: assets -> scene -> render -> sensor -> dataset ->
 denoise -> evaluate -> cli. See docs/architecture.md. Importing `fsid` loads none of them: these names do, and
 so does `fsid.sensor`.
@@ -15,9 +17,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from fsid.denoise import load_model
-    from fsid.denoise.interface import denoise
+    from fsid.denoise import CallablePackage, load_model
     from fsid.sensor import develop, read_raw, write_dng
+
+    denoise: CallablePackage
 
 __version__ = "0.1.0"
 __all__ = ["denoise", "develop", "load_model", "read_raw", "write_dng"]

@@ -1,12 +1,14 @@
 """RAW denoising networks: train them on shards, load them, run them on files of any size.
 
-The package itself can be called: `fsid.denoise(raw)` is `fsid.denoise.interface.denoise`.
+The package itself can be called: `fsid.denoise(raw)` is `fsid.denoise.interface.denoise`, whose description
+`help(fsid.denoise)` opens with.
 
 OpenMP's threads sleep while they wait, unless the environment says otherwise: on a machine that others use
 too, threads that spin keep each other from working (a training step on two threads took ten times as long).
 OpenMP reads this once, when PyTorch is imported.
 """
 
+import inspect
 import os
 import sys
 from types import ModuleType
@@ -45,8 +47,12 @@ __all__ = [
 ]
 
 
-class _CallablePackage(ModuleType):
+class CallablePackage(ModuleType):
+    """What `fsid.denoise` is, for those who check types too: they see the call, and Any in its names."""
+
     __call__ = staticmethod(_denoise)
 
 
-sys.modules[__name__].__class__ = _CallablePackage
+sys.modules[__name__].__class__ = CallablePackage
+__signature__ = inspect.signature(_denoise)
+__doc__ = f"{inspect.getdoc(_denoise)}\n\n{__doc__}"
