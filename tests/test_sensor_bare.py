@@ -1,5 +1,7 @@
 """Mosaics without metadata: every container gives the same Raw, and a wrong size is named."""
 
+import os
+
 import numpy as np
 import pytest
 import tifffile
@@ -39,9 +41,10 @@ def test_an_odd_last_row_and_column_are_dropped(tmp_path):
     assert read_mosaic(tmp_path / "odd.npy", **CAMERA).mosaic.shape == (4, 6)
 
 
-def _npy(array):
+def _npy(array, cut=0):
     def write(path):
         np.save(path, array)
+        os.truncate(path, path.stat().st_size - cut)
 
     return write
 
@@ -56,7 +59,9 @@ def _npy(array):
         ("a.npy", _npy(DN.astype(np.int64) * 20), {}, "65535"),
         ("a.npy", _npy(DN.astype(np.int32) - 4096), {}, "65535"),
         ("a.npy", _npy(np.zeros((4, 4, 3), np.uint16)), {}, r"\(4, 4, 3\)"),
-        ("a.npy", _npy(np.array([{"a": 1}])), {}, r"a\.npy"),
+        ("a.npy", _npy(np.array([{"a": 1}])), {}, "no array of numbers"),
+        ("a.npy", _npy(DN, cut=1), {}, "shorter than its header"),
+        ("a.npy", _npy(DN, cut=DN.nbytes + 1), {}, "shorter than its header"),
         ("a.npy", lambda p: p.write_bytes(b"text"), {}, "no array of numbers"),
         ("a.png", lambda p: p.write_bytes(b"text"), {}, r"a\.png"),
         ("a.png", lambda p: Image.new("RGB", (4, 4)).save(p), {}, r"\(4, 4, 3\)"),

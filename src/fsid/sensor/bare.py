@@ -179,7 +179,8 @@ def _read(path: Path, cfa: str | None, width: int | None, height: int | None) ->
     except Exception as error:  # a decoder of a broken file raises anything, zlib.error among it
         reason = (str(error).splitlines() or [type(error).__name__])[0]
         if kind == ".npy" and isinstance(error, ValueError):
-            reason = "it is no array of numbers"  # NumPy's own line advises to unpickle it
+            is_object = "pickle" in reason  # NumPy's own line advises to unpickle it
+            reason = "it is no array of numbers" if is_object else "it is shorter than its header states"
         raise FsidError(f"{path}: cannot read this {kind} file: {reason}") from error
 
 
