@@ -100,11 +100,3 @@ def _in_srgb(image: Image.Image) -> Image.Image:
     except (KeyError, OSError, ImageCms.PyCMSError):  # none, broken, or of another kind of image
         pass
     return bare.convert("RGB")
-
-
-def crop_rand(rng: np.random.Generator, pixels: np.ndarray, height: int, width: int) -> np.ndarray:
-    """A random (height, width) window of (H, W, 3) `pixels`, or as much of it as the photograph has."""
-    height, width = min(height, pixels.shape[0]), min(width, pixels.shape[1])
-    top = int(rng.integers(pixels.shape[0] - height + 1))
-    left = int(rng.integers(pixels.shape[1] - width + 1))
-    return pixels[top : top + height, left : left + width]

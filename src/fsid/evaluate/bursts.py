@@ -126,7 +126,7 @@ def average(
     mean, variance = _moments(placed, window)
     total, used = np.zeros(mean.shape), np.zeros(mean.shape)
     for x in _frames(placed, window):
-        kept = _is_like_the_others(x - mean, variance, len(placed), first.cfa)
+        kept = _is_like_the_others(x - mean, variance, len(placed))
         total += np.where(kept, x, 0)
         used += kept
     truth = np.where(used > 0, total / np.maximum(used, 1), mean).astype(np.float32)
@@ -219,16 +219,16 @@ def _moments(placed: Sequence[Placed], window: Window) -> tuple[np.ndarray, np.n
     return mean, square / (len(placed) - 1)
 
 
-def _is_like_the_others(deviation: np.ndarray, variance: np.ndarray, frames: int, cfa: str) -> np.ndarray:
+def _is_like_the_others(deviation: np.ndarray, variance: np.ndarray, frames: int) -> np.ndarray:
     """Whether a frame, by its deviation from the mean of all, lies where the others do: within OUTLIER_SIGMA
     of their mean, by their spread, since in a short burst an outlier widens that of all beyond itself."""
     share = frames / (frames - 1)
     others = ((frames - 1) * variance - share * deviation**2) / (frames - 2)
-    limit = OUTLIER_SIGMA * np.sqrt(_spread_over_site(others, cfa))
+    limit = OUTLIER_SIGMA * np.sqrt(_spread_over_site(others))
     return np.asarray(np.sqrt(share) * np.abs(deviation) <= limit + 1e-9)
 
 
-def _spread_over_site(variance: np.ndarray, cfa: str) -> np.ndarray:
+def _spread_over_site(variance: np.ndarray) -> np.ndarray:
     """The variance averaged over neighbours of the same CFA site: one pixel's own is from too few frames."""
     out = np.empty_like(variance)
     for row, column in ((0, 0), (0, 1), (1, 0), (1, 1)):

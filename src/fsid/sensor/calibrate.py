@@ -191,7 +191,7 @@ def _starts(signal: np.ndarray, variance: np.ndarray, frames: int, span: float) 
     while True:
         start = starts[-1]
         width = max(
-            _POOL_WIDTH * float(np.interp(signal[start], middles, errors)), min(span / _MAX_POOLS, 1.0)
+            _POOL_WIDTH * float(np.interp(signal[start], middles, errors)), min(span / _MAX_POOLS, _NARROW_DN)
         )
         end = max(int(np.searchsorted(signal, signal[start] + width)), start + _POOL_PIXELS)
         if end > signal.size - _MIN_POOL_PIXELS:

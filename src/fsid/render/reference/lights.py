@@ -8,6 +8,8 @@ a picture. An area light is a rectangle with an emitting front.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -32,8 +34,12 @@ def emitters(mi: Any, light: Light, name: str) -> dict[str, Any]:
         raise FsidError(f"scene.lights: kind '{light.kind}' is not known to the reference renderer")
     spread = _cloud() * light.radius_m if light.radius_m > 0 else np.zeros((1, 3))
     rgb = np.array(light.colour) / len(spread)
-    make = {"point": _point, "spot": _spot, "sun": _sun}[light.kind]
-    return {f"{name}_{i}": make(mi, light, offset, rgb) for i, offset in enumerate(spread)}
+    kinds: dict[str, Callable[..., dict[str, Any]]] = {
+        "point": _point,
+        "spot": partial(_spot, mi),
+        "sun": _sun,
+    }
+    return {f"{name}_{i}": kinds[light.kind](light, offset, rgb) for i, offset in enumerate(spread)}
 
 
 def surroundings(mi: Any, scene: Scene) -> dict[str, Any]:
@@ -48,7 +54,7 @@ def surroundings(mi: Any, scene: Scene) -> dict[str, Any]:
     return {}
 
 
-def _point(mi: Any, light: Light, offset: np.ndarray, rgb: np.ndarray) -> dict[str, Any]:
+def _point(light: Light, offset: np.ndarray, rgb: np.ndarray) -> dict[str, Any]:
     position = (np.array(light.position_m) + offset).tolist()
     return {"type": "point", "position": position, "intensity": _rgb(rgb)}
 
@@ -69,7 +75,7 @@ def _spot(mi: Any, light: Light, offset: np.ndarray, rgb: np.ndarray) -> dict[st
     }
 
 
-def _sun(mi: Any, light: Light, offset: np.ndarray, rgb: np.ndarray) -> dict[str, Any]:
+def _sun(light: Light, offset: np.ndarray, rgb: np.ndarray) -> dict[str, Any]:
     direction = _unit(_unit(light.direction) + offset)
     return {"type": "directional", "direction": direction.tolist(), "irradiance": _rgb(rgb)}
 
