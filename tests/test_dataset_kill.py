@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -143,6 +144,37 @@ def test_what_the_killed_left_half_written_goes_with_the_next_run(tiny: list[str
         finish(tmp_path, tiny, 8, SHARD)
         assert sorted(path.name for path in tmp_path.iterdir() if path.suffix == ".part") == []
         assert len(content(tmp_path)) == 2
+
+
+@pytest.mark.parametrize("workers", ["1", "2"])
+def test_sigterm_leaves_nothing_half_written(tiny: list[str], tmp_path: Path, workers: str) -> None:
+    """As of Slurm and `docker stop`, which send it to the parent alone."""
+    command = ["generate", str(tmp_path), "--count", "2000", "--workers", workers, "--quiet", "--set"]
+    settings = [*tiny, "noise_levels=1000"]  # so that a shard takes long
+    ended = terminated(command + settings, lambda: list(tmp_path.glob(".shard-*.part")))
+    assert ended == (143, "fsid: terminated; run the same command again to continue")
+    assert [path.name for path in tmp_path.iterdir()] == ["config.yaml"]
+
+
+def test_sigterm_takes_a_half_made_test_set_away(tmp_path: Path) -> None:
+    (tmp_path / "photos").mkdir()
+    picture = Image.fromarray(np.random.default_rng(0).integers(0, 255, (512, 512, 3), np.uint8))
+    for i in range(40):
+        picture.save(tmp_path / "photos" / f"{i}.png")
+    command = ["testset", "photos", str(tmp_path / "photos"), "-o", str(tmp_path / "set"), "--quiet"]
+    ended = terminated(command, (tmp_path / ".set.part").exists)
+    assert ended == (143, "fsid: terminated")
+    assert [path.name for path in tmp_path.iterdir()] == ["photos"]
+
+
+def terminated(arguments: list[str], begun: Callable[[], object]) -> tuple[int, str]:
+    """Exit code and output of `fsid ARGUMENTS`, sent SIGTERM when it has begun."""
+    process = subprocess.Popen([sys.executable, "-m", "fsid", *arguments], stderr=subprocess.PIPE)
+    while not begun():
+        assert process.poll() is None, process.communicate()
+        time.sleep(0.01)
+    process.terminate()
+    return process.wait(), " ".join(process.communicate()[1].decode().split())
 
 
 def test_a_run_keeps_others_out_of_its_folder(tiny: list[str], tmp_path: Path) -> None:

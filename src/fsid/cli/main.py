@@ -5,9 +5,11 @@ from __future__ import annotations
 import errno
 import os
 import select
+import signal
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from types import FrameType
 from typing import NoReturn, TextIO
 
 import tyro
@@ -68,8 +70,14 @@ EXTRAS = {
 }
 
 
+class _Terminated(KeyboardInterrupt):
+    """SIGTERM, as of Slurm and `docker stop`: cleans up as after Ctrl-C."""
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run one command; exit code 0 when done, 2 for bad input or a full disk, 141 when nobody reads on."""
+    """Run one command, in the main thread; exit code 0 when done, 2 for bad input or a full disk, 130 after
+    Ctrl-C, 143 after SIGTERM, 141 when nobody reads on."""
+    before = signal.signal(signal.SIGTERM, _terminate)
     try:
         try:
             _run(arguments)
@@ -84,6 +92,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if is_closed:
             sys.exit(141)
         _fail(os.strerror(error.errno or 0))
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _terminate(number: int, frame: FrameType | None) -> None:
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # a second one must not end the cleaning up
+    raise _Terminated
 
 
 def _run(arguments: Sequence[str] | None) -> None:
@@ -113,11 +128,12 @@ def _run(arguments: Sequence[str] | None) -> None:
         if not str(error).startswith(SYMLINK_LOOP):
             raise
         _fail(str(error))
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as signalled:
+        what, code = ("terminated", 143) if isinstance(signalled, _Terminated) else ("interrupted", 130)
         goes_on = set(sys.argv[1:2] if arguments is None else arguments[:1]) & RESUMABLE
         hint = "; run the same command again to continue" if goes_on else ""
-        Console(stderr=True).print(f"fsid: interrupted{hint}")
-        sys.exit(130)
+        Console(stderr=True).print(f"fsid: {what}{hint}")
+        sys.exit(code)
 
 
 def _is_read(stream: TextIO) -> bool:
