@@ -8,6 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import fsid.assets.skies
+import fsid.render.sky
 from fsid.assets import survey_skies
 from fsid.errors import FsidError
 from fsid.render import Frame, Renderer
@@ -335,6 +337,39 @@ def test_a_sky_of_a_file_is_read_and_scaled(tmp_path) -> None:
     picture = panorama(Sky(f"file:{path}", (1.0, 1.0, 1.0)))
     assert picture.shape == (16, 32, 3)
     np.testing.assert_allclose(picture[3, 3] / picture[3, 3, 0], (1.0, 0.5, 0.25), rtol=1e-5)
+
+
+def test_a_large_sky_is_averaged_and_read_once(tmp_path, monkeypatch) -> None:
+    """To whole cells that tile it, and again where the file has changed."""
+    monkeypatch.setattr(fsid.render.sky, "MOST_HEIGHT", 32)
+    light = np.random.default_rng(0).uniform(0.5, 2, (64, 128, 3)).astype(np.float32)
+    path = tmp_path / "sky.exr"
+    sky = Sky(f"file:{path}", ONE)
+    write_exr(path, light)
+    found = panorama(sky)
+    expected = light.reshape(32, 2, 64, 2, 3).mean((1, 3))
+    np.testing.assert_allclose(found / found[3, 3], expected / expected[3, 3], rtol=1e-5)
+    with monkeypatch.context() as patch:
+        patch.setattr(fsid.render.sky, "_read_exr", None)
+        np.testing.assert_array_equal(panorama(replace(sky, azimuth_deg=360.0)), found)
+    write_exr(path, np.ones((70, 140, 3), np.float32))
+    assert panorama(sky).shape == (23, 46, 3)
+
+
+def test_the_size_of_an_exr_sky_is_checked_before_it_is_decoded(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(fsid.assets.skies, "_MOST_HEIGHT_PX", 16)
+    monkeypatch.setattr(fsid.render.sky, "_equirectangular", None)
+    write_exr(tmp_path / "sky.exr", np.ones((17, 34, 3), np.float32))
+    with pytest.raises(FsidError, match="34 x 17 pixels are more than 32 x 16"):
+        panorama(Sky(f"file:{tmp_path / 'sky.exr'}", ONE))
+
+
+def write_exr(path, light: np.ndarray) -> None:
+    import OpenEXR
+
+    channels = {c: np.ascontiguousarray(light[..., i]) for i, c in enumerate("RGB")}
+    with OpenEXR.File({"type": OpenEXR.scanlineimage}, channels) as file:
+        file.write(str(path))
 
 
 def test_channels_of_an_exr_sky_may_differ_in_precision_and_dip_below_zero(tmp_path) -> None:

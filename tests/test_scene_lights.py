@@ -117,6 +117,7 @@ def test_skies_come_from_a_folder(tmp_path: Path):
     (tmp_path / "page.hdr").write_text("<html>404</html>")
     (tmp_path / "page.exr").write_text("<html>404</html>")
     (tmp_path / "wide.hdr").write_bytes(_radiance_header(64, 33))
+    (tmp_path / "huge.hdr").write_bytes(_radiance_header(32770, 16385))
     (tmp_path / "empty.hdr").touch()
     (tmp_path / "folder.hdr").mkdir()
     (tmp_path / "dangling.hdr").symlink_to(tmp_path / "nowhere.hdr")
@@ -126,7 +127,8 @@ def test_skies_come_from_a_folder(tmp_path: Path):
     found = {sky_rand(rng, config) for _ in range(30)}
     assert found == {f"file:{tmp_path / name}" for name in ("dawn.hdr", "noon.EXR")}
     reasons = dict(survey_skies(str(tmp_path)).skipped)
-    assert len(reasons) == 9
+    assert len(reasons) == 10
+    assert "more than 32768 x 16384" in reasons[f"file:{tmp_path / 'huge.hdr'}"]
     assert "64 x 36 pixels" in reasons[f"file:{tmp_path / 'render.exr'}"]
     assert all(f"{name}: {reason}".encode() and "\n" not in reason for name, reason in reasons.items())
     assert sky_rand(rng, SceneConfig()) == "procedural"

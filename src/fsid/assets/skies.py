@@ -1,6 +1,6 @@
 """Panoramas of a folder for the sky; what its header shows to be something else is left out and counted.
 
-    width = 2 height, height >= 16, channels R, G, B        Radiance .hdr with rows from the top, or OpenEXR
+    width = 2 height, height 16 to 16384, channels R, G, B  Radiance .hdr with rows from the top, or OpenEXR
 
 Folders of downloads hold previews, plain renders and saved error pages; only headers are read here, because
 the pixels of a large panorama take seconds. Who reads them (`fsid.render.sky`) believes nothing either.
@@ -20,7 +20,7 @@ from fsid.errors import FsidError
 SKY_SUFFIXES = (".hdr", ".exr")
 XYZE = b"FORMAT=32-bit_rle_xyze"
 """In the header of a Radiance picture whose numbers are CIE XYZ."""
-LEAST_HEIGHT_PX = 16
+_LEAST_HEIGHT_PX, _MOST_HEIGHT_PX = 16, 16384
 _HEADER_BYTES = 65536
 _RADIANCE = re.compile(rb"#\?.*?\n\n-Y (\d{1,6}) \+X (\d{1,6})\n", re.DOTALL)
 
@@ -63,14 +63,20 @@ def _flaw(path: Path) -> str:
     if not path.is_file():
         return "is missing or not a file"
     try:
-        size = _exr_size(path) if path.suffix.lower() == ".exr" else _radiance_size(path)
+        size = exr_size(path) if path.suffix.lower() == ".exr" else _radiance_size(path)
     except (OSError, RuntimeError, ValueError, KeyError, TypeError) as error:
         return f"cannot be read ({error})"
     if size is None:
         return "is no Radiance or OpenEXR picture with R, G and B and rows from the top"
-    width, height = size
-    if width != 2 * height or height < LEAST_HEIGHT_PX:
+    return size_flaw(*size)
+
+
+def size_flaw(width: int, height: int) -> str:
+    """Why a picture of so many pixels is no panorama to use, "" where it is one."""
+    if width != 2 * height or height < _LEAST_HEIGHT_PX:
         return f"{width} x {height} pixels are no equirectangular picture (twice as wide as high)"
+    if height > _MOST_HEIGHT_PX:
+        return f"{width} x {height} pixels are more than {2 * _MOST_HEIGHT_PX} x {_MOST_HEIGHT_PX}; reduce it"
     return ""
 
 
@@ -81,8 +87,11 @@ def _radiance_size(path: Path) -> tuple[int, int] | None:
     return (int(found[2]), int(found[1])) if found and XYZE not in found[0] else None
 
 
-def _exr_size(path: Path) -> tuple[int, int] | None:
-    """(width, height) of the first part of a .exr."""
+def exr_size(path: Path) -> tuple[int, int] | None:
+    """(width, height) of the first part of a .exr, as its header states it; None where it has no R, G and B.
+
+    Raises what OpenEXR does (OSError, RuntimeError, ValueError, KeyError, TypeError) for what is none.
+    """
     import OpenEXR  # only users of such files need it
 
     with OpenEXR.File(str(path), header_only=True) as file:

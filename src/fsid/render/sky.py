@@ -3,23 +3,26 @@
     clear sky    colour * mix(zenith, horizon, (1 - sin elevation)^4)      below the horizon: ground glow
     clouds       where fractal value noise exceeds a level set by `cloudiness`: white, greyer the thicker
 
-scaled so that the mean radiance of the upper half (by solid angle) is `Sky.colour`. A picture file is used as
-it is, scaled likewise.
+scaled so that the mean radiance of the upper half (by solid angle) is `Sky.colour`. A picture file is scaled
+likewise; one of more than `MOST_HEIGHT` rows is averaged to fewer, because as float32 it would take more
+memory than all the rest of a scene.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
-from fsid.assets.skies import XYZE
+from fsid.assets.skies import XYZE, exr_size, size_flaw
 from fsid.errors import FsidError
 from fsid.scene.colour import LUMINANCE
 from fsid.scene.model import Sky
 
 HEIGHT = 512
+MOST_HEIGHT = 2048
 _ZENITH = np.array([0.42, 0.8, 1.7])
 _HORIZON = np.array([1.2, 1.25, 1.3])
 _THIN_CLOUD, _THICK_CLOUD = np.array([1.6, 1.75, 1.95]), np.array([0.75, 0.85, 1.0])
@@ -43,7 +46,12 @@ def _drawn(sky: Sky) -> np.ndarray:
 
 def _pictured(sky: Sky) -> np.ndarray:
     if sky.source.startswith("file:"):
-        return _read(Path(sky.source.removeprefix("file:")))
+        path = Path(sky.source.removeprefix("file:"))
+        try:
+            state = path.stat()
+        except OSError as error:
+            raise FsidError(f"{path}: cannot be read ({error.strerror})") from None
+        return _read(path, state.st_mtime_ns, state.st_size)
     raise FsidError(f"scene.sky.source '{sky.source}': use 'procedural' or 'file:PATH'")
 
 
@@ -52,15 +60,18 @@ def _scaled(sky: Sky, picture: np.ndarray) -> np.ndarray:
     mean = _mean_above(picture)
     if sky.source != "procedural":
         mean = np.full(3, float(mean @ LUMINANCE))
+    gain = (np.array(sky.colour) / mean).astype(picture.dtype)
     turned = np.roll(picture, round(sky.azimuth_deg / 360 * picture.shape[1]), axis=1)
-    return (turned * (np.array(sky.colour) / mean)).astype(np.float32)
+    turned *= gain
+    return turned.astype(np.float32, copy=False)
 
 
 def _mean_above(picture: np.ndarray) -> np.ndarray:
     """(3,) mean of the upper half by solid angle."""
     elevation, _ = angles(len(picture))
-    weight = np.cos(elevation) * (elevation > 0)
-    return np.asarray((picture * weight[:, None, None]).sum((0, 1)) / (weight.sum() * picture.shape[1]))
+    weight = np.cos(elevation[elevation > 0])
+    above = picture[: len(weight)] * weight[:, None, None]
+    return np.asarray(above.sum((0, 1)) / (weight.sum() * picture.shape[1]))
 
 
 def angles(height: int) -> tuple[np.ndarray, np.ndarray]:
@@ -114,43 +125,71 @@ def _lattice(values: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return np.asarray((a * (1 - u) + b * u) * (1 - v) + (c * (1 - u) + d * u) * v)
 
 
-def _read(path: Path) -> np.ndarray:
-    if path.suffix.lower() == ".exr":
-        return _read_exr(path)
+@lru_cache(maxsize=2)
+def _read(path: Path, changed_ns: int, size: int) -> np.ndarray:
+    """(H, 2 H, 3) float32 >= 0, H <= MOST_HEIGHT. changed_ns, size: of the file, which is read again where
+    they differ from those of the pictures that are kept for the next image."""
+    picture = _read_exr(path) if path.suffix.lower() == ".exr" else _read_hdr(path)
+    picture.flags.writeable = False
+    return picture
+
+
+def _read_hdr(path: Path) -> np.ndarray:
     try:
         data = path.read_bytes()
     except OSError as error:
         raise FsidError(f"{path}: cannot be read ({error.strerror})") from None
-    return _equirectangular(_radiance_hdr(data, path), path)
+    rgbe = _radiance_hdr(data, path)
+    scale = np.ldexp(np.float32(1), np.arange(256) - 136)
+    scale[0] = 0
+    scales = scale[rgbe[..., 3]]
+    return _equirectangular((rgbe[..., i] * scales for i in range(3)), path)
 
 
 def _read_exr(path: Path) -> np.ndarray:
     import OpenEXR
 
     try:
+        _check_size(*(exr_size(path) or (0, 0)), path)
         with OpenEXR.File(str(path), separate_channels=True) as file:
             channels = file.channels()
-            pixels = np.stack([np.asarray(channels[c].pixels, np.float32) for c in "RGB"], axis=-1)
+            return _equirectangular((channels.pop(c).pixels for c in "RGB"), path)
     except (OSError, RuntimeError, KeyError, ValueError):
         raise FsidError(f"{path}: is truncated, unreadable or no OpenEXR picture with R, G and B") from None
-    return _equirectangular(pixels, path)
 
 
-def _equirectangular(picture: np.ndarray, path: Path) -> np.ndarray:
-    """`picture` if it is one; negative values, which the filters of stitching leave, become 0."""
-    height, width = picture.shape[:2]
-    if width != 2 * height or height < 16:
-        raise FsidError(f"{path}: {width} x {height} is no equirectangular picture (twice as wide as high)")
-    if not np.isfinite(picture).all():
-        raise FsidError(f"{path}: holds NaN or infinite values")
-    picture = picture.clip(min=0)
+def _check_size(width: int, height: int, path: Path) -> None:
+    flaw = size_flaw(width, height)
+    if flaw:
+        raise FsidError(f"{path}: {flaw}")
+
+
+def _equirectangular(channels: Iterable[np.ndarray], path: Path) -> np.ndarray:
+    """The picture of the channels R, G, B, (H, 2 H) each and all alike, reduced; FsidError where it gives no
+    light. They come one by one because a large panorama fills memory."""
+    picture = np.stack([_reduced(channel, path) for channel in channels], axis=-1)
     if not _mean_above(picture) @ LUMINANCE > _LEAST_LIGHT * picture.max():
         raise FsidError(f"{path}: its upper half is black and gives no light; turn it over or leave it out")
     return picture
 
 
+def _reduced(channel: np.ndarray, path: Path) -> np.ndarray:
+    """(h, 2 h) float32 means of the texels of (H, 2 H); negative values, which the filters of stitching
+    leave, count as 0."""
+    if not np.isfinite(channel).all():
+        raise FsidError(f"{path}: holds NaN or infinite values")
+    reduced = channel.clip(min=0).astype(np.float32, copy=False)
+    factor = -(-len(channel) // MOST_HEIGHT)
+    height = len(channel) // factor
+    for axis, cells in enumerate((height, 2 * height) if factor > 1 else ()):
+        starts = np.arange(cells) * reduced.shape[axis] // cells
+        texels = np.diff(starts, append=reduced.shape[axis]).astype(np.float32)
+        reduced = np.add.reduceat(reduced, starts, axis) / (texels if axis else texels[:, None])
+    return reduced
+
+
 def _radiance_hdr(data: bytes, path: Path) -> np.ndarray:
-    """(H, W, 3) float32 of a Radiance RGBE file, run-length coded or flat (Ward 1991)."""
+    """(H, 2 H, 4) bytes R, G, B, E of a Radiance file, run-length coded or flat (Ward 1991)."""
     broken = FsidError(f"{path}: is no complete Radiance .hdr picture with rows from the top (-Y .. +X ..)")
     header, _, rest = data.partition(b"\n\n")
     size_line, _, body = rest.partition(b"\n")
@@ -163,8 +202,7 @@ def _radiance_hdr(data: bytes, path: Path) -> np.ndarray:
         height, width = int(words[1]), int(words[3])
     except ValueError:
         raise broken from None
-    if not (0 < height <= 16384 and 0 < width <= 32768):
-        raise broken
+    _check_size(width, height, path)
     flat = np.frombuffer(body, np.uint8)
     if len(flat) == 4 * height * width and not (flat[0] == 2 and flat[1] == 2):
         rgbe = flat.reshape(height, width, 4)
@@ -190,5 +228,4 @@ def _radiance_hdr(data: bytes, path: Path) -> np.ndarray:
                             raise broken
                         row[x : x + count, channel] = run
                         x, at = x + count, at + 1 + count
-    scale = np.ldexp(1.0, rgbe[..., 3].astype(int) - 136)
-    return (rgbe[..., :3] * (scale * (rgbe[..., 3] > 0))[..., None]).astype(np.float32)
+    return rgbe
