@@ -139,3 +139,10 @@ def test_turns_carry_the_axis_to_its_direction(rng):
 
 def test_resting_stands_on_its_lowest_point():
     assert ball(0.3, 2).turned(10, 20, 30).resting(0.1).vertices[:, 2].min() == pytest.approx(0.1)
+
+
+def test_a_bevel_takes_at_most_49_percent_of_the_shortest_side():
+    """What is left of the flat top of a cube is 2 % wide."""
+    cube = box(1.0, 1.0, 1.0, bevel=9.0)
+    top = cube.vertices[cube.vertices[:, 2] > 1 - 1e-9]
+    np.testing.assert_allclose(np.ptp(top, axis=0)[:2], 0.02, atol=1e-9)

@@ -382,3 +382,20 @@ def test_real_furniture_has_its_catalogue_size():
     assert "Attribution" in female.licence
     for source in survey.usable[:5]:
         assert_contract(load_source(source.name))
+
+
+@pytest.mark.parametrize(("bend_deg", "corners"), [(38.0, 4), (42.0, 6)])
+def test_an_edge_is_hard_where_it_bends_by_more_than_forty_degrees(bend_deg: float, corners: int):
+    c, s = np.cos(np.radians(bend_deg)), np.sin(np.radians(bend_deg))
+    vertices = np.array([(0, 0, 0), (0, 1, 0), (-1, 0.5, 0), (c, 0.5, s)])
+    faces = np.array([(0, 1, 2), (1, 0, 3)])
+    assert len(clean(Triangles(vertices, faces, np.zeros(2, int), ("part",))).vertices) == corners
+
+
+def test_the_largest_parts_are_kept_in_the_order_of_the_file():
+    sides = np.array([5, 1, 14, 2, 13, 3, 12, 4, 11, 6, 10, 7, 9, 8], float)
+    right = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0)])
+    vertices = np.concatenate([right * side + (0, 0, i) for i, side in enumerate(sides)])
+    names = tuple(f"{side:.0f}" for side in sides)
+    mesh = clean(Triangles(vertices, np.arange(42).reshape(14, 3), np.arange(14), names))
+    assert mesh.part_names == (*(name for name in names if int(name) > 3), "other")

@@ -338,3 +338,9 @@ class TestTriangle:
         np.testing.assert_allclose(
             hex_colours("ffffff 000000 bcbcbc"), [[1] * 3, [0] * 3, [0.5029] * 3], atol=1e-4
         )
+
+
+def test_noise_is_as_strong_across_as_along(rng):
+    """Power of the waves along u alone and of those along v alone."""
+    power = sum(np.abs(np.fft.fft2(noise(rng, 64, 1.0))) ** 2 for _ in range(150))
+    assert power[0, 2:12].sum() == pytest.approx(power[2:12, 0].sum(), rel=0.15)

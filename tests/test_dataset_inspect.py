@@ -8,6 +8,7 @@ import shutil
 import numpy as np
 import pytest
 from PIL import Image
+from skimage.color import lab2rgb
 
 from fsid.cli.main import main
 from fsid.dataset import find_photos, find_pictures
@@ -250,3 +251,31 @@ def test_bad_input_is_one_line(photos, arguments, words, capsys):
         main(["inspect", *(a.replace("PHOTOS", str(photos)) for a in arguments), "--quiet"])
     assert stop.value.code == 2
     assert words in " ".join(capsys.readouterr().err.split())
+
+
+def test_colours_are_counted_on_both_axes_of_their_plane():
+    """Patches of one lightness on a grid of four a* by four b*: 16 cells, and 125 of variance along each."""
+    a, b = np.meshgrid((-15.0, -5.0, 5.0, 15.0), (-15.0, -5.0, 5.0, 15.0))
+    patches = lab2rgb(np.stack([np.full((4, 4), 60.0), a + 1, b + 1], axis=-1))
+    found = measure(patches.repeat(16, axis=0).repeat(16, axis=1))
+    assert found["ab_coverage"] == 16
+    assert found["colour_regions"] == pytest.approx(np.sqrt(250), rel=0.01)
+    assert found["colour_entropy"].max() == 0
+
+
+def test_greens_and_blues_are_told_apart_in_the_entropy():
+    """Two colours of negative a*, two of negative b*, half a patch of each: one bit."""
+    for pair in ([(80.0, -30.0, 40.0), (80.0, -55.0, 40.0)], [(40.0, 20.0, -30.0), (40.0, 20.0, -55.0)]):
+        halves = lab2rgb(np.array([pair]))
+        found = measure(halves.repeat(16, axis=0).repeat(8, axis=1))
+        np.testing.assert_allclose(found["colour_entropy"], 1)
+
+
+def test_a_step_climbs_as_its_gaussian_says():
+    """Smoothed by 0.7 pixels, the steepest central difference is half the two largest weights."""
+    luma = np.full((32, 32), 0.3, np.float32)
+    luma[:, 16:] = 0.8
+    weights = np.exp(-0.5 * (np.arange(-4, 5) / 0.7) ** 2)
+    weights /= weights.sum()
+    steepest = 10 ** measure(_grey(luma))["gradient"][-1] - 1e-3
+    assert steepest == pytest.approx(0.5 * (weights[4] + weights[5]) / 2, rel=0.01)

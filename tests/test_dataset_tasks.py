@@ -6,6 +6,7 @@ import io
 import struct
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,9 +19,10 @@ from fsid.config import given_keys, load_settings
 from fsid.dataset import GenerateConfig, Sample, check_given, encode, make_sample, read_photo
 from fsid.dataset.attempt import _half_precision
 from fsid.dataset.pictures import read_exr
-from fsid.dataset.tasks import BURST_FRAMES, scene_config
+from fsid.dataset.tasks import BURST_FRAMES, scene_config, smaller, views_of_scene
 from fsid.errors import FsidError
 from fsid.render import Renderer
+from fsid.scene import Scene, sample
 from fsid.sensor import Raw, clean_from_linear, exposure_rand, load_profile, pack
 
 SETTINGS = [
@@ -278,3 +280,43 @@ def test_a_profile_that_does_not_fit_is_left_aside(profile: bytes, tmp_path: Pat
 def test_flow_that_half_precision_cannot_hold_is_none():
     flow = np.array([1e5, -1e5, np.nan, 1.5], np.float32)
     np.testing.assert_array_equal(_half_precision(flow), np.array([np.nan, np.nan, np.nan, 1.5], np.float16))
+
+
+def test_the_lens_of_a_smaller_image_blurs_each_axis_by_its_own_quarter_to_half_pixel() -> None:
+    """Second moments of a blob: sigma^2 is added to its own and to that of a pixel, which both axes have."""
+    blob = np.exp(-0.5 * ((np.arange(128) - 63.5) / 10) ** 2)
+    blob = np.repeat(np.outer(blob, blob)[..., None], 3, axis=2)
+    sigmas = []
+    for seed in range(60):
+        views = smaller(np.random.default_rng(seed), blob, 4)
+        blurred = views.seen[0][..., 1].astype(float)
+        rows, columns = (_second_moment(blurred.sum(axis)) for axis in (1, 0))
+        first, second = views.facts["psf_sigma_px"]
+        assert rows - columns == pytest.approx(first**2 - second**2, abs=1e-3)
+        sigmas += [first, second]
+    assert 0.25 <= min(sigmas) < 0.27 < 0.48 < max(sigmas) <= 0.5
+
+
+def _second_moment(profile: np.ndarray) -> float:
+    at = np.arange(len(profile)) - (profile * np.arange(len(profile))).sum() / profile.sum()
+    return float((profile * at**2).sum() / profile.sum())
+
+
+def test_frames_of_a_burst_come_in_their_order_whatever_that_of_the_cameras() -> None:
+    class Numbers:
+        """A renderer whose images say which frame they are, and to which their flow leads."""
+
+        def radiance(self, scene: Scene, camera_index: int = 0) -> np.ndarray:
+            return np.full((2, 2, 3), scene.cameras[camera_index].frame)
+
+        def render(self, scene: Scene, camera_index: int = 0, flow_to: int | None = None) -> SimpleNamespace:
+            to = np.full((2, 2, 2), scene.cameras[flow_to].frame)
+            return SimpleNamespace(radiance=self.radiance(scene, camera_index), flow=to)
+
+    settings = config("task=burst", "scene.motion.frames=4")
+    scene = sample(scene_config(settings), 0, width=32, height=32)
+    shuffled = replace(scene, cameras=tuple(scene.cameras[i] for i in (2, 0, 3, 1)))
+    views = views_of_scene(np.random.default_rng(0), settings, shuffled, Numbers())
+    assert views.truth[0, 0, 0] == 0
+    assert [seen[0, 0, 0] for seen in views.seen] == [0, 1, 2, 3]
+    assert [flow[0, 0, 0] for flow in views.flow] == [0, 0, 0]

@@ -21,11 +21,13 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
+from accelerate import Accelerator  # noqa: E402
 from safetensors.torch import load_file, save_file  # noqa: E402
 
 from fsid.cli.main import main  # noqa: E402
 from fsid.config import load_settings, save_settings  # noqa: E402
 from fsid.dataset import DatasetConfig, GenerateConfig  # noqa: E402
+from fsid.dataset.loader import Batch  # noqa: E402
 from fsid.dataset.shards import shard_path, write_shard  # noqa: E402
 from fsid.denoise import (  # noqa: E402
     NetworkConfig,
@@ -38,8 +40,8 @@ from fsid.denoise import (  # noqa: E402
 from fsid.denoise.checkpoint import load_checkpoint  # noqa: E402
 from fsid.denoise.raw_denoiser import RawDenoiser  # noqa: E402
 from fsid.denoise.stabilise import stabilise, unstabilise  # noqa: E402
-from fsid.denoise.train import learning_rate, noise_left  # noqa: E402
-from fsid.denoise.validate import Validation, held_out, validation  # noqa: E402
+from fsid.denoise.train import _prepare, _step, learning_rate, noise_left  # noqa: E402
+from fsid.denoise.validate import Validation, _captures, held_out, validation  # noqa: E402
 from fsid.errors import FsidError  # noqa: E402
 from fsid.files import held  # noqa: E402
 from fsid.sensor import Raw, add_noise, clean_levels, load_profile, write_dng  # noqa: E402
@@ -580,3 +582,27 @@ def test_bad_input_is_named(data: Path, tmp_path: Path) -> None:
         train(data, tmp_path / "run", replace(CONFIG, steps=2), quiet=True)
     with pytest.raises(FsidError, match="learning_rate"):
         replace(CONFIG, learning_rate=0.0)
+
+
+def test_a_step_follows_the_settings_of_the_optimizer() -> None:
+    """Gradients of at most `clip_norm`; AdamW with the betas and the decay that were asked for."""
+    config = replace(CONFIG, betas=(0.7, 0.8), weight_decay=0.03, clip_norm=1e-3)
+    accelerator = Accelerator(cpu=True)
+    net, optimizer = _prepare(accelerator, config, None)
+    (group,) = optimizer.param_groups
+    assert (group["betas"], group["weight_decay"]) == ((0.7, 0.8), 0.03)
+    clean, noise = torch.full((1, 4, 16, 16), 0.3), torch.full((1, 4), 1e-3)
+    noisy = clean + 0.02 * torch.randn(clean.shape, generator=torch.Generator().manual_seed(0))
+    _step(accelerator, net, net, optimizer, Batch(noisy, clean, noise, noise), 1e-3, config)
+    gradients = [p.grad.square().sum() for p in net.parameters() if p.grad is not None]
+    assert float(sum(gradients)) ** 0.5 == pytest.approx(1e-3, rel=1e-3)
+
+
+def test_validation_takes_turns_with_the_cameras() -> None:
+    config = replace(CONFIG, profiles=("pixel6", "galaxy-s22"))
+    isos = np.geomspace(config.iso_min, config.iso_max, 3)
+    captures = _captures([patches_of_colour(np.random.default_rng(0))] * 2, config)
+    for name, numbers in (("pixel6", (0, 2, 4)), ("galaxy-s22", (1, 3, 5))):
+        for number in numbers:
+            k = load_profile(name).level(isos[number % 3]).k
+            np.testing.assert_allclose(captures[number].k[0], k, rtol=1e-6)

@@ -356,3 +356,9 @@ def test_an_existing_folder_is_not_overwritten(photos: Path, tmp_path: Path):
     (tmp_path / "mine.txt").write_text("precious")
     with pytest.raises(FsidError, match="not empty"):
         photo_testset([photos], tmp_path, camera="pixel6", isos=[800])
+
+
+def test_a_confidence_interval_is_student_s():
+    """Of 0 and 2: t = 12.706 with one degree of freedom, standard error 1; of 1, 2, 3: 4.303 / sqrt 3."""
+    assert confidence([0.0, 2.0]) == pytest.approx(12.706, abs=1e-3)
+    assert confidence([1.0, 2.0, 3.0]) == pytest.approx(4.3027 / np.sqrt(3), abs=1e-3)

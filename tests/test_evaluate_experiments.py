@@ -171,3 +171,19 @@ def test_the_slider_of_a_report_moves_in_a_browser(photos: Path, tmp_path: Path)
     title = dom[dom.index("<title>") : dom.index("</title>")]
     assert "80%" in title
     assert "true" in title
+
+
+def test_radii_of_dead_leaves_have_the_density_of_scale_invariance(monkeypatch):
+    """1 / r^3 between 4 and 64 texels: P(radius > r) = (r^-2 - 64^-2) / (4^-2 - 64^-2)."""
+    radii = []
+
+    def put(rng, picture, bare, radius, colour):
+        radii.append(radius)
+        return 0 if len(radii) < 4000 else bare.size
+
+    monkeypatch.setattr("fsid.evaluate.dead_leaves._put", put)
+    dead_leaves_rand(np.random.default_rng(0), 64, 64)
+    assert 4 <= min(radii) < max(radii) <= 64
+    for radius in (5.0, 8.0, 16.0):
+        expected = (radius**-2 - 64.0**-2) / (4.0**-2 - 64.0**-2)
+        assert np.mean(np.array(radii) > radius) == pytest.approx(expected, abs=0.03)

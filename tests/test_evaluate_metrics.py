@@ -84,3 +84,17 @@ def test_without_a_noise_level_the_classical_denoiser_says_so(rng: np.random.Gen
     with pytest.raises(Exception, match="noise level is unknown"):
         denoise_classical(dataclasses.replace(clean, noise=None))
     denoise_classical(clean, NoiseLevel((1e-3,) * 4, (1e-5,) * 4))
+
+
+def test_ssim_of_one_window_is_the_formula(rng: np.random.Generator):
+    """Wang et al. 2004, equation 13, with weighted moments that are not corrected for their number."""
+    first, second = rng.uniform(0, 1, (2, 11, 11, 3))
+    bell = np.exp(-0.5 * (np.arange(-5, 6) / 1.5) ** 2)
+    weight = (np.outer(bell, bell) / bell.sum() ** 2)[..., None]
+    a, b, aa, bb, ab = (
+        (weight * x).sum((0, 1)) for x in (first, second, first * first, second * second, first * second)
+    )
+    c1, c2 = 0.01**2, 0.03**2
+    alike = (2 * a * b + c1) * (2 * (ab - a * b) + c2)
+    expected = alike / ((a * a + b * b + c1) * (aa - a * a + bb - b * b + c2))
+    assert ssim(first, second) == pytest.approx(expected.mean(), abs=1e-9)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from fsid.errors import FsidError
 from fsid.render import Frame, Renderer
 from fsid.render.camera import lens_of
 from fsid.render.drawable import View
+from fsid.render.exposure import Shot, shots_of
 from fsid.render.flow import flow_between
 from fsid.scene import SceneConfig, sample
 from fsid.scene.distortion import distorted, fold_radius, undistorted
@@ -244,3 +246,16 @@ def test_albedo_is_flat_where_the_material_is(renderer: Renderer) -> None:
         frame = draw(renderer, view(lambertian(grid(40.0), (0.2, 0.5, 0.7)), camera=camera))
         np.testing.assert_allclose(frame.albedo, np.broadcast_to((0.2, 0.5, 0.7), (96, 96, 3)), atol=1e-3)
         np.testing.assert_allclose(frame.normal[..., 2], 1.0, atol=1e-3)
+
+
+def test_places_far_from_the_middle_of_the_lens_come_at_all_times() -> None:
+    """A spiral runs outwards: in its own order early images would be those of the middle of the lens."""
+    camera = replace(FROM_ABOVE, exposure_s=0.1, velocity_m_s=(1.0, 0.0, 0.0), aperture_m=2.0, focus_m=1.5)
+    shape = camera.height, camera.width
+    middle = Shot(lens_of(camera), 0.0)
+    frame = SimpleNamespace(depth=np.full(shape, 2.0, np.float32), object_id=np.full(shape, -1))
+    shots = shots_of(camera, (), frame, middle, LABEL_SAMPLE, 64, 64)
+    assert len(shots) > 16
+    times = [shot.time_s for shot in shots]
+    places = np.array([shot.lens_offset for shot in shots])
+    assert abs(np.corrcoef(times, np.hypot(*places.T))[0, 1]) < 0.3

@@ -406,3 +406,12 @@ def test_a_background_without_a_material_is_named() -> None:
                 dict.fromkeys(WALLS, plain()),
             )
         )
+
+
+def test_a_sky_turns_from_x_towards_y(tmp_path) -> None:
+    """Column 0 is +x: turned by 90 degrees it is a quarter of the width to the right, +y."""
+    light = np.ones((16, 32, 3), np.float32)
+    light[:, 0] = 9
+    write_exr(tmp_path / "sky.exr", light)
+    picture = panorama(Sky(f"file:{tmp_path / 'sky.exr'}", ONE, azimuth_deg=90.0))
+    assert set(picture[..., 0].argmax(axis=1)) == {8}

@@ -83,3 +83,11 @@ def test_calmed_colours_keep_their_light_and_lose_their_hues():
     dark = calmed(np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 1.0)]), 0.0)
     assert dark.min() >= 0
     assert dark.max() <= 1
+
+
+def test_related_colours_are_lighter_than_dark_ones_and_darker_than_light_ones():
+    """Lighter with probability 1 - (L - 8) / 86."""
+    rng = np.random.default_rng(0)
+    for level in (20.0, 80.0):
+        lighter = np.mean([related_rand(rng, np.array([level, 5, 5]))[0] > level for _ in range(600)])
+        assert lighter == pytest.approx(1 - (level - 8) / 86, abs=0.06)

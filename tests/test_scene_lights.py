@@ -10,6 +10,8 @@ import pytest
 from fsid.assets import PART_KINDS, material_families, survey_skies
 from fsid.errors import FsidError
 from fsid.scene import BackgroundConfig, LightConfig, MaterialConfig, SceneConfig, sample
+from fsid.scene.colour import LUMINANCE
+from fsid.scene.lights import _daylight_rand, _temperature_rand
 from fsid.scene.lobes import EMISSION, LOBES, lobes_rand
 from fsid.scene.materials import PLAIN
 from fsid.scene.pools import POOLS
@@ -226,3 +228,36 @@ def test_no_area_light_turns_its_back_to_the_camera_in_view():
                 cosine = to_light @ to_focus / np.linalg.norm(to_light) / np.linalg.norm(to_focus)
                 assert not behind or cosine < np.cos(np.radians(45)), seed
     assert areas > 30
+
+
+def test_the_sun_is_redder_the_lower_it_stands():
+    suns = [
+        _daylight_rand(np.random.default_rng(i), LightConfig(sun_share=1.0), 5.0, "procedural")[0]
+        for i in range(40)
+    ]
+    heights = [-light.direction[2] for (light,) in suns]
+    redness = np.array([light.colour[0] / light.colour[2] for (light,) in suns])[np.argsort(heights)]
+    assert np.all(np.diff(redness) <= 1e-9)
+    assert redness[0] > 2 * redness[-1]
+
+
+def test_the_sky_at_night_gives_three_tenths_of_what_surroundings_do():
+    night = LightConfig(
+        night_share=1.0, irradiance=(2.0, 2.0), ambient_share=(1.5, 1.5), adaptation=(0.0, 0.0)
+    )
+    for seed in range(3):
+        s = scene(seed, background=OUTSIDE, lights=night)
+        assert {light.kind for light in s.lights} <= {"point", "spot", "area"}
+        assert np.array(s.sky.colour) @ LUMINANCE == pytest.approx(0.3 * 1.5 * 2.0 / np.pi)
+
+
+def test_a_lamp_is_no_larger_than_three_tenths_of_its_distance():
+    wide = LightConfig(radius_m=(1.0, 1.0), kind_shares=(0.5, 0.5, 0.0), count=(4, 4), distance_m=(1.0, 1.0))
+    lights = scene(0, background=OUTSIDE, lights=dataclasses.replace(wide, night_share=1.0)).lights
+    assert [light.radius_m for light in lights] == pytest.approx([0.3] * 4)
+
+
+def test_temperatures_are_uniform_in_mired():
+    rng = np.random.default_rng(0)
+    mired = np.array([1e6 / _temperature_rand(rng, (2000.0, 10000.0)) for _ in range(4000)])
+    assert np.histogram(mired, 4, (100, 500))[0] == pytest.approx([1000] * 4, abs=120)

@@ -198,3 +198,21 @@ def test_every_lens_that_is_drawn_can_be_rendered(width, height, fov_deg, fishey
     config = LensConfig(distortion_share=1.0, distortion=(-0.5, 0.5), fisheye_share=fisheye_share)
     for seed in range(60):
         lens_of(lens_rand(np.random.default_rng(seed), config, camera))
+
+
+def test_the_focus_is_a_share_of_the_distance():
+    config = LensConfig(blur_share=1.0, focus=(2.0, 2.0))
+    camera = lens_rand(np.random.default_rng(0), config, CAMERA)
+    assert camera.focus_m == pytest.approx(2 * np.hypot(2.0, 0.7))
+
+
+def test_a_camera_rolls_about_its_axis_by_the_configured_angle():
+    """Up stays a unit vector across the line of sight, aslant of the vertical plane by the roll."""
+    rolls = []
+    for seed in range(60):
+        camera = scene(seed, camera=CameraConfig(roll_deg=20.0)).cameras[0]
+        right = np.cross(axis(camera), (0.0, 0.0, 1.0))
+        rolls.append(np.degrees(np.arcsin(camera.up @ right / np.linalg.norm(right))))
+        assert np.linalg.norm(camera.up) == pytest.approx(1)
+        assert camera.up @ axis(camera) == pytest.approx(0, abs=1e-9)
+    assert np.sqrt(np.mean(np.square(rolls))) == pytest.approx(20, rel=0.25)

@@ -16,6 +16,7 @@ from fsid.sensor import (
     load_profile,
     noisy_from_clean,
 )
+from fsid.sensor.blind import _HIGH, _Blocks, _line, _Pools, _pools
 
 PROFILE = load_profile("pixel6")
 
@@ -92,3 +93,26 @@ def test_an_image_without_noise_is_refused(mosaic, words):
     with pytest.raises(FsidError, match=words) as caught:
         estimate_noise(scene(mosaic))
     assert "\n" not in str(caught.value)
+
+
+def test_the_noise_of_rounding_is_counted_once():
+    """Pools on a line give that line, though sigma2 is fitted as what it has beyond the floor."""
+    mean, floor = np.linspace(0, 0.8, 12), 1e-6
+    pools = _Pools(mean, 2e-5 * mean + 3 * floor, np.full(12, 1e4))
+    np.testing.assert_allclose(_line(pools, floor)[0], (2e-5, 3 * floor), rtol=1e-9)
+
+
+def test_pools_scatter_by_the_degrees_of_freedom_that_they_state(rng):
+    """Var(variance) = 2 variance^2 / freedom, for the median of the blocks as well."""
+    high = np.square(rng.standard_normal((30, 4800, int(_HIGH.sum())))).mean(axis=2)
+    pools = [_pools(_Blocks(rng.random(4800), np.zeros(4800), of, 1.0), np.array([0.0, 1.0])) for of in high]
+    z2 = [(pool.variance - 1) ** 2 * pool.freedom / 2 for pool in pools]
+    assert np.mean(z2) == pytest.approx(1, abs=0.15)
+
+
+def test_a_site_that_shows_nothing_has_the_errors_of_texture_and_of_other_sites(rng):
+    """Its red is saturated: 8 % that texture makes, and the 10 and 30 % by which sites differ."""
+    noisy = noisy_from_clean(rng, scene(ramp(1024, 1024)), 800, NoiseLevel((2e-3,) * 4, (4e-5,) * 4))
+    noisy.mosaic[::2, ::2] = 1
+    found = estimate_noise(noisy)
+    assert found.k_error[0] / found.level.k[0] == pytest.approx(np.hypot(0.08, 0.1), rel=0.05)

@@ -89,3 +89,9 @@ def test_what_cannot_be_computed_is_named(tmp_path):
         load_profile(tmp_path / "bad.yaml")
     with pytest.raises(FsidError, match="optics"):
         light_level(replace(PIXEL, optics=None), 1)
+
+
+def test_no_shutter_is_faster_than_a_hundred_thousandth():
+    level = light_level(PIXEL, 1e8)
+    assert level.exposure_s == pytest.approx(1e-5)
+    assert level.dimming > 1

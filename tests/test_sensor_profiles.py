@@ -12,7 +12,7 @@ from fsid.cli.iso_notes import note_extrapolation
 from fsid.errors import FsidError
 from fsid.sensor import far_extrapolated, load_profile, profile_names, save_profile
 from fsid.sensor.camera_profile import Measurement
-from fsid.sensor.iso_law import k_law, sigma2_law
+from fsid.sensor.iso_law import k_curve, k_law, sigma2_law
 
 PUBLISHED = {
     "pixel6": "pixel6/main",
@@ -365,3 +365,12 @@ def test_a_range_far_beyond_the_measured_isos_is_noted_and_two_stops_are_not(tmp
     )
     note_extrapolation([str(path)], 20, 400, quiet=True)
     assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize(("standard_errors", "is_pooled"), [(2.5, True), (3.5, False)])
+def test_a_fall_is_real_beyond_three_standard_errors_of_the_difference(standard_errors, is_pooled):
+    iso, error = np.array([100.0, 200.0]), np.full((2, 4), 1e-5)
+    k = np.full((2, 4), 1e-3)
+    k[1] -= standard_errors * np.sqrt(2) * 1e-5
+    found = np.array([k_curve(iso, k, error)(value) for value in iso])
+    np.testing.assert_allclose(found, np.broadcast_to(k.mean(0), (2, 4)) if is_pooled else k, rtol=1e-9)

@@ -303,3 +303,19 @@ def test_a_camera_without_them_gets_no_terms(seed, tmp_path):
     found = calibrate([tmp_path / "light"], name="p", dark=[tmp_path / "dark"], layout=layout, terms=True)
     assert replace(found.profile.terms, prnu=0.0) == NoiseTerms()
     assert found.profile.terms.prnu < 0.003
+
+
+def test_values_below_black_stay_below_it():
+    noise = stack(NoiseTerms(), x=-0.05, frames=1)
+    assert noise.mean() == pytest.approx(0, abs=5e-4)
+
+
+def test_each_unit_has_defects_of_its_own_and_keeps_them():
+    level, terms = NoiseLevel(k=(1e-12,) * 4, sigma2=(1e-12,) * 4), NoiseTerms(defective=0.1)
+    exposures = [
+        add_noise_terms(np.random.default_rng(seed), flat(0.5), level, terms, unit=unit).mosaic
+        for seed, unit in ((0, 0), (1, 0), (0, 1))
+    ]
+    first, again, other = (np.abs(mosaic - 0.5) > 1e-3 for mosaic in exposures)
+    np.testing.assert_array_equal(first, again)
+    assert np.mean(first & other) == pytest.approx(0.01, abs=0.003)

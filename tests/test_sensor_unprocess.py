@@ -196,3 +196,21 @@ def test_white_balance_of_a_frame_does_not_depend_on_its_size():
         exposure_rand(np.random.default_rng(0), light) for light in (picture, np.tile(picture, (40, 50, 1)))
     )
     np.testing.assert_allclose(large / large[1], small / small[1], rtol=1e-5)
+
+
+def test_an_average_scene_is_taken_to_be_as_warm_as_photographs_are():
+    """A white frame, moved towards (0.98, 1.02, 0.74) by a share of 0.1 to 0.8."""
+    rng, white = np.random.default_rng(0), np.ones((8, 8, 3), np.float32)
+    gains = np.array([exposure_rand(rng, white) for _ in range(200)])
+    for channel, mean in ((0, 0.98), (2, 0.74)):
+        shares = np.log(gains[:, channel] / gains[:, 1]) / np.log(mean / 1.02)
+        assert 0.1 - 1e-4 < shares.min() < 0.15 < 0.75 < shares.max() < 0.8 + 1e-4
+
+
+def test_no_channel_is_balanced_by_more_than_a_factor_of_four():
+    """A red frame: red by 1 / 4, the others by 4, to the power of a share of 0.1 to 0.8."""
+    rng, red = np.random.default_rng(0), np.full((8, 8, 3), (1.0, 1e-6, 1e-6), np.float32)
+    gains = np.array([exposure_rand(rng, red) for _ in range(200)])
+    shares = np.log(gains[:, 1:] / gains[:, :1]) / np.log(16)
+    np.testing.assert_allclose(shares[:, 0], shares[:, 1], rtol=1e-4)
+    assert 0.1 - 1e-4 < shares.min() < 0.15 < 0.75 < shares.max() < 0.8 + 1e-4
