@@ -25,6 +25,9 @@ from fsid.scene.model import ZERO, Camera
 STEP_PX = 1.5
 LENS_STEP_PX = 4.0
 _FEWEST = 4
+_TIME_STEP = (
+    0.7320508  # of the exposure; the golden ratio is what the spiral turns by, and would go around once
+)
 
 
 @dataclass(frozen=True)
@@ -73,7 +76,7 @@ def shots_of(
         return []
     places = spiral(count) * camera.aperture_m / 2
     part_m = camera.aperture_m / np.sqrt(count)
-    order = np.argsort((np.arange(count) * 0.6180339887) % 1.0, kind="stable")
+    order = np.argsort((np.arange(count) * _TIME_STEP) % 1.0, kind="stable")
     shots = []
     for i, (right, up) in enumerate(places[order]):
         since = ((i + 0.5) / count - 0.5) * camera.exposure_s if moving else 0.0
