@@ -75,6 +75,20 @@ def test_flicker_is_divided_out(clean: Raw, tmp_path: Path):
     assert (truth.mosaic - clean.mosaic)[clean.mosaic < 0.8].std() < 1.3 * quality.error
 
 
+@pytest.mark.parametrize("drift_dn", [0.0, 0.4])
+def test_a_drifting_black_level_is_no_flicker(clean: Raw, tmp_path: Path, drift_dn: float):
+    """A lamp in a dark room: 0.4 DN are a sixth of the mean light, which scaled the lamp by as much."""
+    mosaic = 0.02 * gaussian_filter(clean.mosaic, 4)
+    mosaic[40:60, 40:72] = 0.1
+    lamp = replace(clean, mosaic=mosaic)
+    drifts = np.float32(drift_dn / PROFILE.span) * np.cos(2.5 * np.arange(FRAMES, dtype=np.float32))
+    paths = _burst(tmp_path / "b", lamp, lambda raw, f: replace(raw, mosaic=raw.mosaic + drifts[f]), iso=100)
+    truth, quality, _ = average(paths[1:], paths[0])
+    error = truth.mosaic - lamp.mosaic - drifts[0]
+    assert (quality.frames, quality.flicker) == (FRAMES - 1, 0)
+    assert quality.psnr == pytest.approx(-10 * np.log10(np.mean(error**2)), abs=0.5)
+
+
 def test_whole_shifts_are_undone_and_others_left_out(clean: Raw, tmp_path: Path):
     def moved(raw: Raw, frame: int) -> Raw:
         if frame == 3:

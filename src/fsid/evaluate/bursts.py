@@ -1,14 +1,15 @@
 """A test set from captures: the truth is the robust mean of a burst, with its own error bar.
 
-    truth = mean_f clip(x_f / g_f),    clip: within 4 sigma of the first mean,    error = sigma / sqrt(F)
+    truth = mean_f clip((x_f - o_f) / g_f),         clip: within 4 sigma of the first mean
+    error^2 = sigma^2 / F + error^2(g, o) / 2       the half that all frames share: the first frame's noise
 
     CAPTURES/<scene>/<level>/*.dng        one burst each: static scene, locked focus, exposure and ISO
 
 The first frame of a burst is the noisy test frame and stays out of the truth, else its noise would be the
-truth's, too; further ones are the first that lie on it in the same light. g_f is the flicker of the light; a
-frame that moved is shifted back where the shift is a whole number of CFA tiles (`placing`), and left out
-where it is not, since interpolating would blur the truth. Truth and noisy frames are cut to what all frames
-show.
+truth's, too; further ones are the first that lie on it in the same light. g_f is the flicker of the light,
+o_f the drift of the black level; a frame that moved is shifted back where the shift is a whole number of CFA
+tiles (`placing`), and left out where it is not, since interpolating would blur the truth. Truth and noisy
+frames are cut to what all frames show.
 """
 
 from __future__ import annotations
@@ -130,7 +131,8 @@ def average(
         total += np.where(kept, x, 0)
         used += kept
     truth = np.where(used > 0, total / np.maximum(used, 1), mean).astype(np.float32)
-    error = float(np.sqrt(np.mean(variance, dtype=np.float64) / len(placed)))
+    shared2 = float(np.mean([p.error2 for p in placed])) / 2
+    error = float(np.sqrt(np.mean(variance, dtype=np.float64) / len(placed) + shared2))
     quality = TruthQuality(
         image=image,
         level=level,
@@ -179,7 +181,7 @@ def _noisy_frames(paths: Sequence[Path], frames: int) -> list[Path]:
         if len(found) == frames:
             break
         placed = place(path, first)
-        if not placed.fault and placed.roll == (0, 0) and abs(placed.gain - 1) <= MAX_NOISY_FLICKER:
+        if not placed.fault and placed.roll == (0, 0) and abs(placed.brightness - 1) <= MAX_NOISY_FLICKER:
             found.append(path)
     if len(found) < frames:
         raise FsidError(
@@ -204,9 +206,10 @@ def _cut(raw: Raw, window: Window) -> Raw:
 
 
 def _frames(placed: Sequence[Placed], window: Window) -> Iterator[np.ndarray]:
-    """What the frames, in place, have in the window, without flicker."""
+    """What the frames, in place, have in the window, without flicker and drift."""
     for p in placed:
-        yield np.roll(read_raw(p.path).mosaic, p.roll, axis=(0, 1))[window] / np.float32(p.gain)
+        rolled = np.roll(read_raw(p.path).mosaic, p.roll, axis=(0, 1))[window]
+        yield (rolled - np.float32(p.offset)) / np.float32(p.gain)
 
 
 def _moments(placed: Sequence[Placed], window: Window) -> tuple[np.ndarray, np.ndarray]:

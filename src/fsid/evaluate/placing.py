@@ -3,6 +3,9 @@
 A frame that moved by a whole number of CFA tiles can be put back. A shift that the noise of two frames
 explains is none: on smooth scenes the estimate wanders by tiles, and the less a shift shows the less it does
 to the truth.
+
+Light and black level of a frame are set against the first one's once it lies on it, as in calibration
+(`fsid.sensor.light_change`). Where blocks are too alike to tell the two apart, all of it counts as light.
 """
 
 from __future__ import annotations
@@ -18,6 +21,14 @@ from skimage.registration import phase_cross_correlation
 
 from fsid.errors import FsidError
 from fsid.sensor import Raw, pack, read_raw
+from fsid.sensor.light_change import (
+    MAX_CLIPPED_SHARE,
+    MIN_BLOCKS,
+    Blocks,
+    gain_and_offset,
+    line_error2,
+    tells_gain,
+)
 
 MAX_FLICKER = 0.2
 """A frame whose brightness differs by more from the first is left out."""
@@ -44,16 +55,21 @@ Window = tuple[slice, slice]
 
 @dataclass(frozen=True)
 class Placed:
-    """Where a frame goes: roll by (rows, columns) pixels, then divide by the gain.
+    """Where a frame goes: roll by (rows, columns) pixels, subtract the offset, then divide by the gain.
 
-    fault: what keeps it out of the truth, or "". rest: rows and columns, in tiles, that rolling leaves.
+    offset: normalised. error2: squared standard error of both, normalised, on the mean over the image.
+    brightness: mean of the frame, relative to the first one's. rest: rows and columns, in tiles, that
+    rolling leaves. fault: what keeps the frame out of the truth, or "".
     """
 
     path: Path
     roll: tuple[int, int]
     gain: float
+    offset: float
+    error2: float
+    brightness: float
+    rest: tuple[float, float]
     fault: str = ""
-    rest: tuple[float, float] = (0.0, 0.0)
 
 
 def read_first(path: Path) -> Raw:
@@ -102,14 +118,38 @@ def place(path: Path, first: Raw) -> Placed:
     if raw.iso != first.iso:
         raise FsidError(f"{path}: ISO {raw.iso:g} differs from ISO {first.iso:g} of the burst's first frame")
     ours, theirs = (_green(r) for r in (raw, first))
-    gain = float(ours.sum() / theirs.sum())
-    if not abs(gain - 1) <= MAX_FLICKER:
-        return Placed(path, (0, 0), gain, _FLICKERED)
-    whole, rest = shift_between(ours / gain, theirs)
+    brightness = float(ours.sum() / theirs.sum())
+    whole, rest = shift_between(ours - (ours.mean() - theirs.mean()), theirs)
+    gain, offset, error2 = _light(whole, ours, theirs, first.white_level - first.black_level)
     most = min(MAX_SHIFT_TILES, MAX_SHIFT_SHARE * min(ours.shape))
-    moved = np.abs(rest).max() > MAX_SUBPIXEL or np.abs(whole).max() > most
-    roll = 2 * int(whole[0]), 2 * int(whole[1])
-    return Placed(path, roll, gain, _MOVED if moved else "", (float(rest[0]), float(rest[1])))
+    fault = _MOVED if np.abs(rest).max() > MAX_SUBPIXEL or np.abs(whole).max() > most else ""
+    return Placed(
+        path,
+        roll=(2 * int(whole[0]), 2 * int(whole[1])),
+        gain=gain,
+        offset=offset,
+        error2=error2,
+        brightness=brightness,
+        rest=(float(rest[0]), float(rest[1])),
+        fault=fault if abs(gain - 1) <= MAX_FLICKER else _FLICKERED,
+    )
+
+
+def _light(whole: np.ndarray, ours: np.ndarray, theirs: np.ndarray, span: int) -> tuple[float, float, float]:
+    """(gain, offset, squared error) of `ours`, rolled by `whole`, against `theirs`; normalised."""
+    seen = _shown(whole)
+    ours, theirs = (plane[seen] for plane in (np.roll(ours, tuple(whole), axis=(0, 1)), theirs))
+    blocks, change = Blocks.of(theirs.shape), span * (ours - theirs)
+    clipped = np.maximum(ours, theirs) >= 1 - 0.5 / span
+    usable = blocks.reduce(clipped, np.mean) < MAX_CLIPPED_SHARE
+    level = span * blocks.reduce(theirs, np.mean)[usable]
+    noise, error2 = (values[usable] for values in blocks.noise(change))
+    weight = 1 / error2
+    if usable.sum() < MIN_BLOCKS or not tells_gain(level, weight):
+        return float(ours.sum() / theirs.sum()), 0.0, 0.0
+    gain, offset_dn = gain_and_offset(blocks.reduce(change, np.mean)[usable], level, weight)
+    white_noise = blocks.size[0] * blocks.size[1] / noise
+    return gain, offset_dn / span, line_error2(level, white_noise, span * theirs) / span**2
 
 
 def shift_between(ours: np.ndarray, theirs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -3,9 +3,9 @@
     frame_f = gain_f scene + offset_f + noise_f,      change_f = frame_f - offset_f - gain_f frame_0
 
 A lamp flickers and a black level drifts: gain and offset of a frame are those of its 8x8 block means against
-the first frame's, which hardly hold noise. They are used only where they exceed `SIGNIFICANT` standard
-errors, so that a steady burst is left alone and its variance unbiased. Changes are not divided by the gain:
-so the noise of frames counts as they have it, and mean and variance are both those of the burst's mean light.
+the first frame's, where they are significant (`light_change`), so that a steady burst is left alone and its
+variance unbiased. Changes are not divided by the gain: so the noise of frames counts as they have it, and
+mean and variance are both those of the burst's mean light.
 A block that still differs afterwards, and by enough to count as noise, has moved: it is left out, and where a
 quarter moved the burst is refused.
 
@@ -18,29 +18,23 @@ Sums count from the first frame, so that they stay small. Memory is 22 bytes per
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from fsid.errors import FsidError
+from fsid.sensor.light_change import MAX_CLIPPED_SHARE, MIN_BLOCKS, SIGNIFICANT, Blocks, gain_and_offset
 from fsid.sensor.mosaic import site_offsets
 from fsid.sensor.quantise import MAX_DN
 
-SIGNIFICANT = 5.0  # standard errors: of 64 blocks in 1,000 frames none deviates so far by chance
 LARGEST_FLICKER = 0.1  # of the light; beyond it this is another exposure, and its noise another noise
 MOVED_SHARE = 0.25  # of the blocks, from which on the burst shows no static scene
 CONTAMINATION = 0.1  # of a pixel's noise variance, from which on a changed block spoils the fit
 STUCK = 0.9  # of the frames at 0 or white; what noise carries there less often still tells its variance
 LARGEST_CORRELATION = 0.1  # between the changes of neighbours; noise has none
-_BANDING = 0.1  # of the noise that rows or columns may have in common
 TILE = tuple(np.s_[row::2, column::2] for row in (0, 1) for column in (0, 1))  # sites, whatever their colour
-_GRID = 8
 _THINNING = 4
-_MIN_BLOCK_SIDE_PX = 8
-_MIN_BLOCKS = 4  # to tell gain from offset
-_MAX_CLIPPED_SHARE = 0.01  # of a block that still tells the light
-_MIN_CONTRAST = 100.0  # variance between blocks over their noise; below it the gain is drowned
+_LEAST_WHITE_TEST_PX = 64
 
 
 @dataclass(frozen=True)
@@ -177,7 +171,7 @@ class TemporalStatistics:
         Pixels that touched a limit once are not left out: that would keep the quiet ones and bias sigma2.
         """
         stuck = np.maximum(self._zeros, self._whites) > STUCK * self.frames
-        height, width = self._block
+        height, width = self._blocks.size
         for row, column in np.argwhere(self._moved):
             stuck[row * height : (row + 1) * height, column * width : (column + 1) * width] = True
         return stuck
@@ -192,30 +186,20 @@ class TemporalStatistics:
         self._zeros, self._whites = np.zeros(dn.shape, np.uint16), np.zeros(dn.shape, np.uint16)
         self._moments = np.zeros((2, len(TILE)))  # sums over frames: mean d^2 and d^4 of each site
         self._banding = np.zeros(2)  # sums over frames: variance of row means, of column means
-        rows, columns = (max(1, min(_GRID, side // _MIN_BLOCK_SIDE_PX)) for side in dn.shape)
-        height, width = dn.shape[0] // rows, dn.shape[1] // columns
-        self._block = max(height // 2 * 2, 1), max(width // 2 * 2, 1)  # as much of each site in every block
-        self._moved = np.zeros((rows, columns), bool)
-        self._reference = self._blocks(self._first, np.mean)
-
-    def _blocks(self, image: np.ndarray, reduce: Callable[..., np.ndarray]) -> np.ndarray:
-        """(rows, columns) of `reduce` over each block; what does not fill a block is left out."""
-        (height, width), (rows, columns) = self._block, self._moved.shape
-        tiles = image[: height * rows, : width * columns].reshape(rows, height, columns, width)
-        return reduce(tiles, axis=(1, 3))
+        self._blocks = Blocks.of(dn.shape)  # as much of each site in every block
+        self._moved = np.zeros(self._blocks.grid, bool)
+        self._reference = self._blocks.reduce(self._first, np.mean)
 
     def _match(self, change: np.ndarray, whites: np.ndarray, name: str) -> tuple[float, float, np.ndarray]:
         """(gain, offset, moved blocks) of a frame against the first one; (1, 0) where neither is significant.
 
         whites: how often each pixel was white, this frame included.
         """
-        usable = ~self._moved & (self._blocks(whites > 0, np.mean) < _MAX_CLIPPED_SHARE)
-        means, noise = self._blocks(change, np.mean), np.maximum(self._blocks(change, np.var), 1 / 12)
-        if usable.sum() < _MIN_BLOCKS:
+        usable = ~self._moved & (self._blocks.reduce(whites > 0, np.mean) < MAX_CLIPPED_SHARE)
+        if usable.sum() < MIN_BLOCKS:
             return 1.0, 0.0, self._moved
-        height, width = self._block
-        error2 = noise * (1 / (height * width) + _BANDING / min(height, width))
-        gain, offset = _gain_and_offset(means[usable], self._reference[usable], 1 / error2[usable])
+        means, (noise, error2) = self._blocks.reduce(change, np.mean), self._blocks.noise(change)
+        gain, offset = gain_and_offset(means[usable], self._reference[usable], 1 / error2[usable])
         left2 = (means - (gain - 1) * self._reference - offset) ** 2
         changed = usable & (left2 > CONTAMINATION * noise / 2) & (left2 > SIGNIFICANT**2 * error2)
         moved = self._moved | changed
@@ -267,7 +251,7 @@ def _check_white(sign: np.ndarray, name: str) -> None:
     """
     across, down = sign[::_THINNING], sign[:, ::_THINNING].T
     count = min(across.size, down.size)
-    if count < _MIN_BLOCK_SIDE_PX**2 or min(sign.shape) < 3:
+    if count < _LEAST_WHITE_TEST_PX or min(sign.shape) < 3:
         return
     found = [float(np.mean(c[:, 2:] * c[:, :-2]) / max(np.mean(c * c), 1e-6)) for c in (across, down)]
     if min(found) > max(LARGEST_CORRELATION, 2 * SIGNIFICANT / np.sqrt(count)):
@@ -275,27 +259,3 @@ def _check_white(sign: np.ndarray, name: str) -> None:
             f"{name}: it is shifted against the first frame of the burst, the camera or the scene moved; "
             f"use a tripod and a static scene"
         )
-
-
-def _gain_and_offset(change: np.ndarray, reference: np.ndarray, weight: np.ndarray) -> tuple[float, float]:
-    """Weighted line through the change of block means over their level, twice: what moved counts once."""
-    slope, level = _line(change, reference, weight)
-    z2 = weight * (change - slope * reference - level) ** 2
-    still = z2 <= max(SIGNIFICANT**2, 9 * float(np.median(z2)))
-    slope, level = _line(change[still], reference[still], weight[still])
-    return 1.0 + slope, level
-
-
-def _line(change: np.ndarray, reference: np.ndarray, weight: np.ndarray) -> tuple[float, float]:
-    """(slope, intercept); 0 where they are not significant, or the slope where the contrast is too small."""
-    total = weight.sum()
-    middle = float((weight * reference).sum() / total)
-    x = reference - middle
-    spread = float((weight * x**2).sum())
-    level = float((weight * change).sum() / total)
-    slope = float((weight * x * change).sum() / spread) if spread > _MIN_CONTRAST * len(x) else 0.0
-    if abs(slope) * np.sqrt(spread) < SIGNIFICANT:
-        slope = 0.0
-    if slope == 0.0 and abs(level) * np.sqrt(total) < SIGNIFICANT:
-        level = 0.0
-    return slope, level - slope * middle
