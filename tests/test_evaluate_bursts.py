@@ -15,7 +15,7 @@ from fsid.errors import FsidError
 from fsid.evaluate import NOISY, burst_testset, compare, psnr, read_testset, simulated_testset
 from fsid.evaluate.bursts import average
 from fsid.evaluate.placing import shift_between
-from fsid.sensor import Raw, load_profile, noisy_from_clean, read_raw, write_dng
+from fsid.sensor import NoiseTerms, Raw, load_profile, noisy_from_clean, read_raw, write_dng
 from fsid.sensor.metadata import ORIENTATION, Metadata
 from fsid.sensor.tiff import SHORT, Tag
 from stated_black import state_black
@@ -33,14 +33,20 @@ def clean(tmp_path_factory: pytest.TempPathFactory) -> Raw:
     return read_raw(root / "fabric-00" / "clean.dng")
 
 
-def _burst(folder: Path, clean: Raw, change=lambda raw, frame: raw, iso: float = 1600) -> list[Path]:
+def _burst(
+    folder: Path,
+    clean: Raw,
+    change=lambda raw, frame: raw,
+    iso: float = 1600,
+    terms: NoiseTerms = NoiseTerms(),
+) -> list[Path]:
     """FRAMES noisy frames of `clean` at `iso`; change(raw, frame) alters the light of a frame."""
     folder.mkdir(parents=True)
     clean = replace(clean, black_level=PROFILE.black_level, white_level=PROFILE.white_level)
     paths = []
     for frame in range(FRAMES):
         seen = change(clean, frame)
-        noisy = noisy_from_clean(np.random.default_rng(frame), seen, iso, PROFILE.level(iso))
+        noisy = noisy_from_clean(np.random.default_rng(frame), seen, iso, PROFILE.level(iso), terms)
         paths.append(folder / f"{frame:03d}.dng")
         write_dng(paths[-1], noisy)
     return paths
@@ -126,6 +132,28 @@ def test_noise_moves_no_frame_of_a_smooth_scene(clean: Raw, tmp_path: Path, iso:
     truth, quality, _ = average(paths[1:], paths[0])
     assert (quality.frames, quality.shift_px) == (FRAMES - 1, 0)
     assert (truth.mosaic - smooth.mosaic).std() == pytest.approx(quality.error, rel=0.1)
+
+
+def test_noise_of_rows_moves_no_frame(clean: Raw, tmp_path: Path):
+    """Rows of common noise look like a picture that shifts down, if every pixel counts by itself."""
+    dim = replace(clean, mosaic=0.05 * gaussian_filter(np.tile(clean.mosaic, (2, 2)), 2))
+    paths = _burst(tmp_path / "b", dim, iso=3200, terms=NoiseTerms(row=0.3))
+    _, quality, _ = average(paths[1:], paths[0])
+    assert (quality.frames, quality.shift_px) == (FRAMES - 1, 0)
+
+
+@pytest.mark.parametrize("tiles", [0.3, 3])
+def test_a_lamp_in_the_dark_that_moved_is_seen(clean: Raw, tmp_path: Path, tiles: float):
+    mosaic = np.full_like(clean.mosaic, 0.005)
+    mosaic[40:52, 60:80] = 0.3
+    lamp = replace(clean, mosaic=mosaic)
+    moved = replace(lamp, mosaic=shifted(mosaic, tiles))
+    paths = _burst(
+        tmp_path / "b", lamp, lambda raw, f: replace(raw, mosaic=(moved if f == 4 else lamp).mosaic)
+    )
+    _, quality, _ = average(paths[1:], paths[0])
+    assert quality.left_out == (tiles < 1)
+    assert quality.shift_px == pytest.approx(2 * tiles * np.sqrt(2) * (tiles >= 1))
 
 
 def test_a_first_frame_that_the_shutter_shook_leaves_no_bare_edge(clean: Raw, tmp_path: Path):

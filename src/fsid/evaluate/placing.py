@@ -184,23 +184,33 @@ def _brings_nearer(whole: np.ndarray, ours: np.ndarray, theirs: np.ndarray) -> b
     """Whether `ours` rolled by `whole` differs less from `theirs` than it does in place, beyond noise."""
     seen = _shown(whole)
     rolled = np.roll(ours, tuple(whole), axis=(0, 1))
-    gained = ((ours - theirs) ** 2 - (rolled - theirs) ** 2)[seen]
+    here, there = (_unbanded((plane - theirs)[seen]) for plane in (ours, rolled))
+    gained = here**2 - there**2
     return bool(gained.mean() > SIGNIFICANT * gained.std() / np.sqrt(gained.size))
 
 
 def _lies_beside(ours: np.ndarray, theirs: np.ndarray) -> bool:
-    """Whether a small shift explains, beyond noise, how two planes (h, w) of equal light differ.
+    """Whether a small shift explains, beyond noise, how two planes (h, w) of like light differ.
 
     ours - theirs = -shift . gradient + noise: the correlation with the gradient, less what of it looks like
     another light, has the error that the differences themselves tell (White 1980).
     """
     smooth = uniform_filter(theirs.astype(np.float64), 3)
-    slopes = np.stack([slope.ravel() for slope in np.gradient(smooth)], axis=1)
-    light = np.stack([np.ones(smooth.size), smooth.ravel()], axis=1)
-    slopes -= light @ np.linalg.lstsq(light, slopes, rcond=None)[0]
-    scores = slopes * (ours - theirs).reshape(-1, 1)
+    slopes = np.stack([_unbanded(slope).ravel() for slope in np.gradient(smooth)], axis=1)
+    light = _unbanded(smooth).reshape(-1, 1)
+    change = _unbanded(ours - theirs).reshape(-1, 1)
+    slopes, change = (v - light @ np.linalg.lstsq(light, v, rcond=None)[0] for v in (slopes, change))
+    scores = slopes * change
     total = scores.sum(axis=0)
     return bool(total @ np.linalg.pinv(scores.T @ scores) @ total > SIGNIFICANT**2)
+
+
+def _unbanded(plane: np.ndarray) -> np.ndarray:
+    """A plane (h, w) less the means of its rows and columns, whose noise is common to many pixels.
+
+    Stripes that run from edge to edge along the pixels are lost with it, and tell no shift.
+    """
+    return plane - plane.mean(axis=1, keepdims=True) - plane.mean(axis=0) + plane.mean()
 
 
 def _green(raw: Raw) -> np.ndarray:
