@@ -50,8 +50,9 @@ _BESIDE_RAW = frozenset((".jpg", ".jpeg", ".heic", ".heif", ".xmp"))
 class TruthQuality:
     """How good the truth of one burst is. frames: used; left_out: moved or flickering ones.
 
-    error: standard error of the truth, normalised; psnr: the best RAW PSNR that could be measured against it,
-    dB. outliers: share of samples left out. flicker: largest |g - 1|; shift_px: largest shift undone.
+    error: standard error of the truth, normalised, of what changes between frames: what all show (defective
+    pixels, fixed pattern) counts as scene; psnr: the best RAW PSNR that could be measured against it, dB.
+    outliers: share of samples left out. flicker: largest |g - 1|; shift_px: largest shift undone.
     """
 
     image: str
