@@ -277,6 +277,16 @@ def test_the_lowest_of_bare_dark_frames_is_the_black_level(tmp_path, rng):
     np.testing.assert_allclose(found.fits[0].black, 64, atol=0.5)
 
 
+def test_bare_dark_frames_that_drift_are_one_burst(tmp_path, rng):
+    """4 DN are 6 % of a level of 64 DN, but less than the noise: the black level is the mean of all."""
+    lit = write_arrays(tmp_path / "lit", [to_dn(raw) for raw in exposures(rng, scene(), 3200, 10)])
+    dark = [to_dn(raw) + 4 * (number % 2) for number, raw in enumerate(exposures(rng, scene(0.0), 3200, 10))]
+    paths = write_arrays(tmp_path / "dark", dark)
+    fit = calibrate(lit, name="x", dark=paths, layout=replace(LAYOUT, iso=3200, black_level=None)).fits[0]
+    np.testing.assert_allclose(fit.black, 66, atol=0.5)
+    np.testing.assert_allclose(fit.sigma2_dn / 959**2, PROFILE.level(3200).sigma2, rtol=0.05)
+
+
 def test_a_frame_counts_once_and_hidden_files_not_at_all(tmp_path, rng):
     folder = tmp_path / "iso800" / "deeper"
     frames = write_arrays(folder, [to_dn(raw) for raw in exposures(rng, scene(), 800, 5)])

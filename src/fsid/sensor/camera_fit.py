@@ -108,7 +108,7 @@ class _Reader:
         if len(burst) < 2:
             alone = "ISO and exposure"
             if self.found.camera.bare:
-                alone = f"light, {burst[0].level:.1f} DN on the mean, within 3 % of the file before it"
+                alone = f"light, {burst[0].level:.1f} DN on the mean, unlike the file before it"
             raise FsidError(
                 f"{burst[0].path}: the only frame of its {alone}; a burst needs the same picture "
                 f"several times: add frames or leave it out"

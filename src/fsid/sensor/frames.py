@@ -2,7 +2,8 @@
 
 RAW files say their ISO and exposure time. Bare mosaics (.npy, .png, .tif, .raw) say nothing: their ISO is
 what their path says ("iso3200/a.png", "dark_ISO800_3.npy") or the caller gives, and consecutive files whose
-mean level agrees within 3 % or half a DN are one burst. Frames are opened one by one and never kept.
+mean level agrees within 3 % or half a DN are one burst; dark frames also within 3 sigma of their noise, since
+black levels drift. Frames are opened one by one and never kept.
 """
 
 from __future__ import annotations
@@ -25,7 +26,9 @@ from fsid.sensor.mosaic import check_cfa
 from fsid.sensor.quantise import check_levels
 
 SAME_LIGHT, SAME_DN = 0.03, 0.5  # difference of the levels of two frames of one burst, relative or in DN
+SAME_DARK = 3.0  # difference of the levels of two dark frames of one burst, in standard deviations of a pixel
 SAME_BLACK_DN = 1.0  # difference of the stated black levels of two frames of one mode: phones measure it anew
+_GAUSS_MAD = 0.6745  # median absolute deviation of a standard normal number
 _ISO_IN_PATH = re.compile(r"iso[-_ ]?(\d+)", re.IGNORECASE)
 _SITES_DIFFER = 0.02  # of the level: a flat grey through colour filters differs by far more
 
@@ -61,12 +64,16 @@ class Camera:
 
 @dataclass(frozen=True)
 class Frame:
-    """A frame on disk. iso and exposure_s: 0 where unknown. level: mean DN of a bare mosaic, else 0."""
+    """A frame on disk. iso and exposure_s: 0 where unknown.
+
+    level: mean DN of a bare mosaic, else 0. same_dn: how far the level of another frame of its burst may lie.
+    """
 
     path: Path
     iso: float
     exposure_s: float
-    level: float
+    level: float = 0.0
+    same_dn: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -136,14 +143,10 @@ def bursts(frames: Sequence[Frame]) -> list[tuple[Frame, ...]]:
     for _, same in groupby(sorted(frames, key=lambda f: f.exposure_s), key=lambda f: f.exposure_s):
         found.append([])
         for frame in same:
-            if found[-1] and not _same_light(frame, found[-1][0]):
+            if found[-1] and abs(frame.level - found[-1][0].level) > found[-1][0].same_dn:
                 found.append([])
             found[-1].append(frame)
     return [tuple(burst) for burst in found]
-
-
-def _same_light(one: Frame, other: Frame) -> bool:
-    return abs(one.level - other.level) <= max(SAME_LIGHT * other.level, SAME_DN)
 
 
 def frame_files(paths: Sequence[Path]) -> list[Path]:
@@ -191,7 +194,7 @@ def _raw_frames(paths: Sequence[Path], dark: Sequence[Path], layout: Layout) -> 
 
     def frame(path: Path) -> Frame:
         header: RawHeader = headers[path]
-        return Frame(path, header.iso or _iso_in(path), header.exposure_s, 0.0)
+        return Frame(path, header.iso or _iso_in(path), header.exposure_s)
 
     frames, notes = _with_iso([frame(path) for path in (*paths, *dark)], layout.iso)
     return FrameSet(
@@ -222,7 +225,9 @@ def _bare_frames(
         if layout.white_level is not None:
             check_white(dn, level or 0, layout.white_level, path)
         shape, highest = dn.shape, max(highest, int(dn.max()))
-        frames.append(Frame(path, _iso_in(path), 0.0, float(dn.mean())))
+        mean_dn, noise_dn = float(dn.mean()), _noise_dn(dn) if number >= len(paths) else 0.0
+        same_dn = max(SAME_LIGHT * mean_dn, SAME_DN, SAME_DARK * noise_dn)
+        frames.append(Frame(path, _iso_in(path), 0.0, mean_dn, same_dn))
         if progress is not None:
             progress(number + 1, len(paths) + len(dark))
     notes = []
@@ -267,6 +272,12 @@ def _iso_in(path: Path) -> float:
     """The last ISO in a path, 0 where there is none."""
     named = _ISO_IN_PATH.findall(path.as_posix())
     return float(named[-1]) if named else 0.0
+
+
+def _noise_dn(dn: np.ndarray) -> float:
+    """Standard deviation of a pixel of an even picture, from neighbours of the same site in its row."""
+    steps = np.abs(dn[:, 2:].astype(np.int32) - dn[:, :-2])
+    return float(np.median(steps)) / (_GAUSS_MAD * np.sqrt(2)) if steps.size else 0.0
 
 
 def _check_mono(path: Path, dn: np.ndarray) -> None:
