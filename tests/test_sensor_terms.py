@@ -192,7 +192,7 @@ def test_calibration_finds_the_terms_again(tmp_path):
     measured = found.profile.terms
     for name, rtol in (("row", 0.25), ("column", 0.25), ("fixed", 0.1), ("prnu", 0.15), ("defective", 0.3)):
         assert getattr(measured, name) == pytest.approx(getattr(terms, name), rel=rtol), name
-    assert 0.3 < measured.tail < 1.1  # of the sum with rows, columns and rounding, which are Gaussian
+    assert measured.tail == pytest.approx(terms.tail, rel=0.25)
     np.testing.assert_allclose(found.profile.sigma2[0], 1e-4, rtol=0.05)
 
 
@@ -256,6 +256,34 @@ def test_sites_of_different_noise_make_no_tail(rng):
     for tail in (0.0, 0.8):
         dark, _ = _dark_and_flat(rng, level, NoiseTerms(tail=tail), (0.1,) * 4)
         assert dark_finding(dark, 800, 0.01).terms.tail == pytest.approx(tail, abs=0.1)
+
+
+def _found_again(terms, level, seeds, side):
+    """What calibration finds of `terms` in six dark frames, for each seed."""
+    found = []
+    for seed in range(seeds):
+        stats, rng = TemporalStatistics(1023, dark=True), np.random.default_rng([seed, 5])
+        for _ in range(6):
+            stats.add(to_dn(noisy_from_clean(rng, flat(0.0, side), 800, level, terms)))
+        found.append(dark_finding(stats, 800, 0.01).terms)
+    return found
+
+
+@pytest.mark.parametrize("sigma2", [4e-5, 1.2e-6])
+def test_calibration_finds_the_terms_that_simulation_had(sigma2):
+    """The tail is that of what pixels have by themselves, also where rounding is 8 % of the noise."""
+    terms = NoiseTerms(row=0.25, column=0.05, tail=1.0, fixed=0.4)
+    found = _found_again(terms, NoiseLevel(LEVEL.k, (sigma2,) * 4), seeds=12, side=160)
+    for name in ("row", "column", "tail", "fixed"):
+        mean = np.mean([getattr(terms, name) for terms in found])
+        assert mean == pytest.approx(getattr(terms, name), rel=0.1), name
+
+
+def test_drift_of_short_bursts_is_found_on_the_mean():
+    """In units of the mean sigma of sites that differ, as it is drawn."""
+    level = NoiseLevel(LEVEL.k, (4e-5, 1e-5, 1e-5, 6e-5))
+    found = _found_again(NoiseTerms(drift=0.7), level, seeds=100, side=48)
+    assert np.mean([terms.drift**2 for terms in found]) == pytest.approx(0.7**2, rel=0.15)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.002])

@@ -25,7 +25,7 @@ import numpy as np
 from fsid.errors import FsidError
 from fsid.sensor.light_change import MAX_CLIPPED_SHARE, MIN_BLOCKS, SIGNIFICANT, Blocks, gain_and_offset
 from fsid.sensor.mosaic import site_offsets
-from fsid.sensor.quantise import MAX_DN
+from fsid.sensor.quantise import MAX_DN, ROUNDING_DN2
 
 LARGEST_FLICKER = 0.1  # of the light; beyond it this is another exposure, and its noise another noise
 MOVED_SHARE = 0.25  # of the blocks, from which on the burst shows no static scene
@@ -41,11 +41,13 @@ _LEAST_WHITE_TEST_PX = 64
 class ReadStatistics:
     """Parts of the noise of a burst in DN^2: of a pixel, of its rows and of its columns; excess kurtosis.
 
-    pixel_dn2, excess_kurtosis: mean over the sites. level_dn2: variance of the frames' levels, as a drifting
-    black level has it.
+    pixel_dn2, excess_kurtosis: mean over the sites, of all that a pixel shows. sigma_dn: mean over the sites
+    of the standard deviation before the converter, DN. level_dn2: variance of the frames' levels, as a
+    drifting black level has it.
     """
 
     pixel_dn2: float
+    sigma_dn: float
     row_dn2: float
     column_dn2: float
     excess_kurtosis: float
@@ -159,10 +161,11 @@ class TemporalStatistics:
         kurtosis = fourth[second > 0] / second[second > 0] ** 2
         return ReadStatistics(
             pixel_dn2=float(second.mean()) / 2,
+            sigma_dn=float(np.sqrt(np.maximum(second / 2 - ROUNDING_DN2, 0)).mean()),
             row_dn2=max(row / 2, 0.0),
             column_dn2=max(column / 2, 0.0),
             excess_kurtosis=2 * (float(kurtosis.mean()) - 3) if kurtosis.size else 0.0,
-            level_dn2=float(np.var(self.offsets_dn)) if self.frames > 2 else 0.0,
+            level_dn2=float(np.var([0.0, *self.offsets_dn], ddof=1)),
         )
 
     def _unusable(self) -> np.ndarray:

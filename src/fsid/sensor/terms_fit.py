@@ -1,7 +1,7 @@
 """The terms beyond k and sigma2, from what calibration streams anyway; see `terms` for their meaning.
 
     row, column         variance of row (column) means of dark frames beyond what pixel noise leaves in them
-    tail, drift         kurtosis of the changes of dark pixels; variance of the frames' levels
+    tail, drift         kurtosis of the changes of dark pixels, of their own part; variance of frames' levels
     fixed, prnu         spatial variance of the mean image, dark or evenly lit, less the noise left in it
     dark_current_e_s    slope of the dark level over exposure time, in electrons (k DN each)
     defective           share of dark pixels far from the median of their 5x5 neighbours of the same site
@@ -9,10 +9,11 @@
 All but the dark current are those of an ISO's shortest dark frames: longer ones hold its shot noise, too.
 
 Spatial variance is that of differences between neighbours of the same site: vignetting is smooth and cancels.
-Every site is measured by itself. Its pattern counts in DN^2, and the mean over the sites is set against that
-of their noise, or of their squared signals, which differ even on a grey card. A term that does not stand out
-of its own error is left off. Poisson statistics and quantisation are no measurements: they are how sensors
-work, and stay the user's choice.
+All shares are those of noise before the converter, as simulation draws it: of the mean sigma of the sites,
+which rows, columns and frames have in common, or site by site. Every site is measured by itself. Its pattern
+counts in DN^2, and the mean over the sites is set against that of their noise, or of their squared signals,
+which differ even on a grey card. A term that does not stand out of its own error is left off. Poisson
+statistics and quantisation are no measurements: they are how sensors work, and stay the user's choice.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from fsid.sensor.calibrate import RESOLVED_DN2
+from fsid.sensor.quantise import ROUNDING_DN2
 from fsid.sensor.temporal import TILE, TemporalStatistics
 from fsid.sensor.terms import NoiseTerms
 
@@ -32,6 +34,7 @@ CUT_OFF = 0.002  # of the dark values at DN 0, from which on noise is no longer 
 FAR = 10.0  # robust standard deviations: a defective pixel
 _AROUND = 5  # pixels of the same site, the side of a neighbourhood
 _STANDING_OUT = 0.02  # share of the noise from which on a term is worth having
+_LEAST_ALONE = 0.1  # of the noise; with less, the pixels' own part drowns in that of rows and columns
 _GAUSS_MAD = 0.6745  # median absolute deviation of a standard normal number
 _CUT = 3.0  # standard deviations, beyond which a step is an edge or a defect
 _LEFT_BY_CUT = 0.9733  # of the variance of a normal number, within the cut
@@ -55,16 +58,19 @@ def dark_finding(stats: TemporalStatistics, iso: float, exposure_s: float) -> Da
     if found.pixel_dn2 < RESOLVED_DN2 or stats.zero_share > CUT_OFF:
         return None
     mean = stats.mean()
-    left = found.pixel_dn2 / stats.frames
+    left = (found.pixel_dn2 - found.row_dn2) / stats.frames  # between neighbours in a row
     spread2 = _spread2(mean)
     fixed2 = max(spread2 - left, 0.0)
     far = _from_around(mean) > FAR * max(np.sqrt(2 * spread2), 0.1)
+    before2 = found.pixel_dn2 - ROUNDING_DN2
+    row, column = (part / found.sigma_dn**2 for part in (found.row_dn2, found.column_dn2))
+    alone = max(1 - row - column, _LEAST_ALONE) * before2 / found.pixel_dn2
     terms = NoiseTerms(
-        row=_standing_out(found.row_dn2 / found.pixel_dn2),
-        column=_standing_out(found.column_dn2 / found.pixel_dn2),
-        tail=_standing_out(found.excess_kurtosis),
-        drift=float(np.sqrt(_standing_out(found.level_dn2 / found.pixel_dn2))),
-        fixed=float(np.sqrt(_standing_out(fixed2 / found.pixel_dn2))),
+        row=_standing_out(row),
+        column=_standing_out(column),
+        tail=_standing_out(found.excess_kurtosis / alone**2),
+        drift=float(np.sqrt(_standing_out(found.level_dn2 / found.sigma_dn**2))),
+        fixed=float(np.sqrt(_standing_out(fixed2 / before2))),
         defective=float(far.mean()),
     )
     return DarkFinding(iso, exposure_s, float(mean[~far].mean()), fixed2, terms)
