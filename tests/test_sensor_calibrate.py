@@ -60,6 +60,20 @@ def test_dark_frames_give_black_and_read_noise():
     np.testing.assert_allclose(fit.sigma2_dn, sigma2_dn, rtol=0.03)
 
 
+def test_hot_pixels_do_not_lift_the_black_level():
+    """One in a thousand that shows any value would lift it by half a DN; shading by 12 DN is no defect."""
+    rng = np.random.default_rng(0)
+    shape = (160, 160)
+    scene = Raw(np.zeros(shape, np.float32), PROFILE.cfa, 64, 1023, (1, 1, 1), np.eye(3))
+    hot, shading = rng.random(shape) < 1e-3, np.rint(12 * np.linspace(0, 1, shape[1]) ** 4).astype(np.int64)
+    dark = TemporalStatistics(white_level=1023)
+    for _ in range(20):
+        dn = to_dn(noisy_from_clean(rng, scene, 3200, PROFILE.level(3200))) + shading
+        dark.add(np.where(hot, 600, dn))
+    fit = fit_noise([_burst(_gradient(), 3200, 20, rng)], cfa=PROFILE.cfa, white_level=1023, dark=dark)
+    np.testing.assert_allclose(fit.black, 64 + shading.mean(), atol=0.15)
+
+
 def test_lines_of_arrays_make_a_profile(tmp_path):
     rng = np.random.default_rng(7)
     dark_scene = Raw(np.zeros((96, 96), np.float32), PROFILE.cfa, 64, 1023, (1, 1, 1), np.eye(3))

@@ -7,10 +7,11 @@ pattern. Pixels of like mean are pooled, and each pool weighs as much as its var
 of the mean of N sample variances from n frames is 2 V^2 / (N (n - 1)). Unweighted, the bright pools drown the
 intercept. Dark frames give black level and intercept directly; without them the black level must be known.
 
-Excluded: pixels that hardly ever left 0 or white, means above 70 % of the range (EMVA 1288, 6.6), and pixels
-whose variance no Gaussian noise explains (telegraph noise, something moved). What rounding and clipping make
-of noise is undone (`stored_noise`): sigma2_dn is the variance before the converter plus the 1/12 DN^2 that
-rounding adds wherever noise spreads over several integers, as in every published table.
+Excluded: pixels that hardly ever left 0 or white, means above 70 % of the range (EMVA 1288, 6.6), pixels
+whose variance no Gaussian noise explains (telegraph noise, something moved), and those of dark frames that
+lie far from their neighbours (`defects`). What rounding and clipping make of noise is undone
+(`stored_noise`): sigma2_dn is the variance before the converter plus the 1/12 DN^2 that rounding adds
+wherever noise spreads over several integers, as in every published table.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from scipy.special import gammaincinv
 
 from fsid.errors import FsidError
 from fsid.sensor.camera_profile import MONO
+from fsid.sensor.defects import defective
 from fsid.sensor.quantise import ROUNDING_DN2
 from fsid.sensor.stored_noise import PLACES, before_clipping, before_rounding, dark_noise
 from fsid.sensor.temporal import TemporalStatistics
@@ -111,7 +113,7 @@ def pool_dark(
 
     black: DN of each site, where it is known from shorter dark frames; else the level is the black level.
     """
-    sites = dark.sites(cfa)
+    sites = dark.sites(cfa, defective(dark.mean()))
     if min(mean.size for mean, _ in sites) < _MIN_POOL_PIXELS:
         raise FsidError("the dark frames are clipped everywhere; check that the lens was covered")
     found = []

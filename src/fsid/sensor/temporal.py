@@ -23,6 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fsid.errors import FsidError
+from fsid.sensor.defects import TILE
 from fsid.sensor.light_change import MAX_CLIPPED_SHARE, MIN_BLOCKS, SIGNIFICANT, Blocks, gain_and_offset
 from fsid.sensor.mosaic import site_offsets
 from fsid.sensor.quantise import MAX_DN, ROUNDING_DN2
@@ -32,7 +33,6 @@ MOVED_SHARE = 0.25  # of the blocks, from which on the burst shows no static sce
 CONTAMINATION = 0.1  # of a pixel's noise variance, from which on a changed block spoils the fit
 STUCK = 0.9  # of the frames at 0 or white; what noise carries there less often still tells its variance
 LARGEST_CORRELATION = 0.1  # between the changes of neighbours; noise has none
-TILE = tuple(np.s_[row::2, column::2] for row in (0, 1) for column in (0, 1))  # sites, whatever their colour
 _THINNING = 4
 _LEAST_WHITE_TEST_PX = 64
 
@@ -105,9 +105,16 @@ class TemporalStatistics:
         gain, offset = np.mean([1.0, *self.gains]), sum(self.offsets_dn) / self.frames
         return gain * self._first + self._sum / self.frames + offset
 
-    def sites(self, cfa: str | None) -> list[tuple[np.ndarray, np.ndarray]]:
-        """(mean, variance) in DN of the usable pixels of each site; of all pixels if `cfa` is None."""
+    def sites(
+        self, cfa: str | None, left_out: np.ndarray | None = None
+    ) -> list[tuple[np.ndarray, np.ndarray]]:
+        """(mean, variance) in DN of the usable pixels of each site; of all pixels if `cfa` is None.
+
+        left_out: (H, W) bool, pixels that shall not count.
+        """
         mean, usable = self.mean(), ~self._unusable()
+        if left_out is not None:
+            usable &= ~left_out
         freedom = (self.frames - 1) * self._counted_noise()
         places = [np.s_[:, :]] if cfa is None else [np.s_[r::2, c::2] for r, c in site_offsets(cfa)]
         found = []

@@ -22,20 +22,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import median_filter
 
 from fsid.sensor.calibrate import RESOLVED_DN2
+from fsid.sensor.defects import GAUSS_MAD, TILE, defective
 from fsid.sensor.quantise import ROUNDING_DN2
-from fsid.sensor.temporal import TILE, TemporalStatistics
+from fsid.sensor.temporal import TemporalStatistics
 from fsid.sensor.terms import NoiseTerms
 
 FLAT = 0.1  # contrast of an evenly lit burst, relative to its signal; beyond it texture looks like PRNU
 CUT_OFF = 0.002  # of the dark values at DN 0, from which on noise is no longer symmetric
-FAR = 10.0  # robust standard deviations: a defective pixel
-_AROUND = 5  # pixels of the same site, the side of a neighbourhood
 _STANDING_OUT = 0.02  # share of the noise from which on a term is worth having
 _LEAST_ALONE = 0.1  # of the noise; with less, the pixels' own part drowns in that of rows and columns
-_GAUSS_MAD = 0.6745  # median absolute deviation of a standard normal number
 _CUT = 3.0  # standard deviations, beyond which a step is an edge or a defect
 _LEFT_BY_CUT = 0.9733  # of the variance of a normal number, within the cut
 _REWEIGHTINGS = 10
@@ -59,9 +56,8 @@ def dark_finding(stats: TemporalStatistics, iso: float, exposure_s: float) -> Da
         return None
     mean = stats.mean()
     left = (found.pixel_dn2 - found.row_dn2) / stats.frames  # between neighbours in a row
-    spread2 = _spread2(mean)
-    fixed2 = max(spread2 - left, 0.0)
-    far = _from_around(mean) > FAR * max(np.sqrt(2 * spread2), 0.1)
+    fixed2 = max(_spread2(mean) - left, 0.0)
+    far = defective(mean)
     before2 = found.pixel_dn2 - ROUNDING_DN2
     row, column = (part / found.sigma_dn**2 for part in (found.row_dn2, found.column_dn2))
     alone = max(1 - row - column, _LEAST_ALONE) * before2 / found.pixel_dn2
@@ -131,19 +127,11 @@ def _variance_without_outliers(steps: np.ndarray) -> float:
     Means of a few integers are multiples of 1/frames, among which a median jumps by more than what is sought.
     """
     square = steps**2
-    found = float(np.median(square)) / _GAUSS_MAD**2
+    found = float(np.median(square)) / GAUSS_MAD**2
     for _ in range(_REWEIGHTINGS):
         within = square[square <= _CUT**2 * found]
         found = float(within.mean()) / _LEFT_BY_CUT if within.size else found
     return found
-
-
-def _from_around(mean: np.ndarray) -> np.ndarray:
-    """(H, W) DN between `mean` (H, W) and its local median, to which smooth shading belongs."""
-    distance = np.empty_like(mean)
-    for site in TILE:
-        distance[site] = np.abs(mean[site] - median_filter(mean[site], _AROUND))
-    return distance
 
 
 def _dark_current(dark: Sequence[DarkFinding], k_dn_at_iso: dict[float, float]) -> float:
