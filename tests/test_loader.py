@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import re
 import sys
 import tarfile
@@ -306,6 +307,32 @@ def test_crops_of_a_frame_are_of_one_scene(tmp_path: Path) -> None:
     crops = GenerateConfig(crops=2, crop_width=WIDTH, crop_height=HEIGHT)
     save_settings(DatasetConfig(0, 4, crops), dataset / "config.yaml")
     assert [mosaic.scene for mosaic in index_mosaics(dataset)] == [0, 0, 1, 1]
+
+
+def write_stated(folder: Path, records: list[dict]) -> Path:
+    """A dataset without config.yaml, of one sample with this JSON for each record."""
+    image = io.BytesIO()
+    write_dng(image, raw(np.zeros((HEIGHT, WIDTH))))
+    samples = [
+        (f"b{i:08d}", {"clean.dng": image.getvalue(), "json": json.dumps(record).encode()})
+        for i, record in enumerate(records)
+    ]
+    write_shard(shard_path(folder, 0), samples)
+    return folder
+
+
+def test_without_settings_samples_say_themselves_which_scene_they_are_of(tmp_path: Path) -> None:
+    own = {"key": "00000000", "seed": 5, "frame": 7, "split": "train"}
+    rendered = {**own, "scene": {"parts": [{}]}, "settings": {"scene": {}}}
+    validation = {**rendered, "frame": 8, "split": "validation"}
+    data = write_stated(tmp_path, [rendered, validation, rendered, {**rendered, "seed": 6}])
+    assert [mosaic.scene for mosaic in index_mosaics(data)] == [0, 1, 0, 2]
+    assert [mosaic.split for mosaic in index_mosaics(data)] == ["train", "validation", "train", "train"]
+    pictures = [{**own, "frame": frame, "image": f"{frame % 2}.png", "settings": {}} for frame in range(4)]
+    assert [mosaic.scene for mosaic in index_mosaics(write_stated(tmp_path, pictures))] == [0, 1, 0, 1]
+    assert PatchDataset(tmp_path, replace(CONFIG, held_out=1), seed=0).mosaics == 2
+    with pytest.raises(FsidError, match=r"b00000000\.json: is not the JSON of a sample"):
+        index_mosaics(write_stated(tmp_path, [[]]))
 
 
 @pytest.mark.parametrize("key", ["./scene_a_0001", "abc", "../../evil", "9" * 5000])

@@ -9,9 +9,11 @@ tar file. Indexing reads tar and TIFF headers only.
 from __future__ import annotations
 
 import hashlib
+import re
 import tarfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Literal
 
@@ -20,7 +22,7 @@ import tifffile
 from fsid.config import from_plain, read_yaml
 from fsid.dataset.attempt import SAMPLE_KEY
 from fsid.dataset.config import DatasetConfig, split_of
-from fsid.dataset.shards import find_shards
+from fsid.dataset.shards import find_shards, read_files, read_record
 from fsid.errors import FsidError
 from fsid.sensor import dng_tags
 from fsid.sensor.mosaic import check_cfa
@@ -29,6 +31,9 @@ from fsid.sensor.raw import NoiseLevel
 
 _ORIGIN_KEYS = ("crops", "exposures", "noise_levels", "validation_every")
 """Settings that say which scene a sample is from; others may be those of another version of FSID."""
+
+_LONG_PART = re.compile(rb', "(scene|settings)": \{')
+"""Where in the JSON that FSID writes all is said of its origin, and 100 kB may follow that are not parsed."""
 
 MosaicKind = Literal["clean", "noisy"]
 
@@ -98,10 +103,10 @@ def task_of(data_dir: Path) -> str:
 
 
 def _origin(data_dir: Path) -> Callable[[StoredMosaic], tuple[int, str]]:
-    """Scene and split of a sample by its key, from the config.yaml of the dataset, where there is one."""
+    """Scene and split of a sample: by its key from config.yaml; where there is none, as its JSON says."""
     file = data_dir / "config.yaml"
     if not file.exists():
-        return lambda mosaic: (int(mosaic.key) if SAMPLE_KEY.fullmatch(mosaic.key) else 0, "train")
+        return _origin_by_json()
     plain = read_yaml(file)
     known = plain.get("generate", {})
     if isinstance(known, dict):
@@ -122,6 +127,37 @@ def _origin(data_dir: Path) -> Callable[[StoredMosaic], tuple[int, str]]:
         return scene, split_of(config, scene)
 
     return origin
+
+
+def _origin_by_json() -> Callable[[StoredMosaic], tuple[int, str]]:
+    """Scenes are numbered as they come, by seed and frame or by the name of their picture.
+
+    What has no JSON, or one that says nothing of it, is for training, and its scene is the number in its key.
+    """
+    scenes: dict[str, int] = {}
+
+    @lru_cache(maxsize=1)  # a shard's mosaics come one after the other
+    def stated(shard: Path) -> dict[str, tuple[str, str]]:
+        return {
+            name.removesuffix(".json"): _stated_origin(data, f"{shard}: {name}")
+            for name, data in read_files(shard, ".json")
+        }
+
+    def origin(mosaic: StoredMosaic) -> tuple[int, str]:
+        scene, split = stated(mosaic.shard).get(mosaic.key, ("", "train"))
+        if scene:
+            return scenes.setdefault(scene, len(scenes)), split
+        return int(mosaic.key) if SAMPLE_KEY.fullmatch(mosaic.key) else 0, split
+
+    return origin
+
+
+def _stated_origin(data: bytes, where: str) -> tuple[str, str]:
+    """What tells a sample's scene from others, "" where its JSON does not, and its split."""
+    long = _LONG_PART.search(data) if data.startswith(b'{"key": ') else None
+    record = read_record(data[: long.start()] + b"}" if long else data, where)
+    of_frame = f"seed {record.get('seed')} frame {record['frame']}" if "frame" in record else ""
+    return str(record.get("image", of_frame)), str(record.get("split", "train"))
 
 
 def _index_shard(shard: Path, suffix: str) -> list[StoredMosaic]:

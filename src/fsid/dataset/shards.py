@@ -12,7 +12,7 @@ import json
 import os
 import socket
 import tarfile
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -92,7 +92,7 @@ def read_member(path: str | Path, name: str) -> bytes:
 def read_samples(path: Path) -> dict[str, dict[str, bytes]]:
     """All samples of a shard by key, and their files by extension. FsidError where it is not readable."""
     samples: dict[str, dict[str, bytes]] = {}
-    for name, data in _read(path, lambda name: True):
+    for name, data in read_files(path):
         key, _, extension = name.partition(".")
         samples.setdefault(key, {})[extension] = data
     return samples
@@ -111,15 +111,16 @@ def read_record(data: bytes, where: str) -> dict[str, Any]:
 
 def read_records(path: Path) -> Iterator[dict[str, Any]]:
     """The content of the JSON of every sample of a shard. FsidError where it is not readable."""
-    for name, data in _read(path, lambda name: name.endswith(".json")):
+    for name, data in read_files(path, ".json"):
         yield read_record(data, f"{path}: {name}")
 
 
-def _read(path: Path, wanted: Callable[[str], bool]) -> Iterator[tuple[str, bytes]]:
+def read_files(path: Path, suffix: str = "") -> Iterator[tuple[str, bytes]]:
+    """Name and content of the files of a shard whose names end so. FsidError where it is not readable."""
     try:
         with tarfile.open(path, "r:") as tar:
             for member in tar:
-                file = tar.extractfile(member) if wanted(member.name) else None
+                file = tar.extractfile(member) if member.name.endswith(suffix) else None
                 if file is not None:
                     yield member.name, file.read()
     except (OSError, tarfile.TarError) as error:
