@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import re
+import shutil
 import sys
 import tarfile
 import time
@@ -23,7 +24,7 @@ from fsid.dataset.index import index_mosaics  # noqa: E402
 from fsid.dataset.levels import LevelTable  # noqa: E402
 from fsid.dataset.loader import Batch, PatchConfig, PatchDataset, packed, window_rand  # noqa: E402
 from fsid.dataset.order import shuffled  # noqa: E402
-from fsid.dataset.shards import shard_path, write_shard  # noqa: E402
+from fsid.dataset.shards import read_samples, shard_path, write_shard  # noqa: E402
 from fsid.errors import FsidError  # noqa: E402
 from fsid.sensor import (  # noqa: E402
     CFA_PATTERNS,
@@ -333,6 +334,26 @@ def test_without_settings_samples_say_themselves_which_scene_they_are_of(tmp_pat
     assert PatchDataset(tmp_path, replace(CONFIG, held_out=1), seed=0).mosaics == 2
     with pytest.raises(FsidError, match=r"b00000000\.json: is not the JSON of a sample"):
         index_mosaics(write_stated(tmp_path, [[]]))
+
+
+def test_a_key_that_comes_twice_is_refused(tmp_path: Path) -> None:
+    """Two datasets in one folder: which noisy image belongs to which clean one would be a guess."""
+    image = raw(np.zeros((HEIGHT, WIDTH)))
+    write_dataset(tmp_path, [image] * 2)
+    shutil.copy(shard_path(tmp_path, 0), shard_path(tmp_path, 1))
+    with pytest.raises(FsidError, match=r"shard-00001\.tar: 00000000 is also in .*shard-00000\.tar; .*keys"):
+        index_mosaics(tmp_path)
+
+
+def test_the_two_images_of_a_pair_are_of_one_shard(tmp_path: Path) -> None:
+    image = raw(np.full((HEIGHT, WIDTH), 9000))
+    noisy = replace(image, noise=NoiseLevel(k=(1e-3,) * 4, sigma2=(1e-5,) * 4))
+    write_pairs(tmp_path, [image], [noisy])
+    (sample,) = read_samples(shard_path(tmp_path, 0)).values()
+    for number, kind in enumerate(("clean.dng", "noisy.dng")):
+        write_shard(shard_path(tmp_path, number), [("00000000", {kind: sample[kind]})])
+    with pytest.raises(FsidError, match=r"shard-00000\.tar: 00000000 has no noisy image"):
+        PatchDataset(tmp_path, replace(CONFIG, noise="stored"), seed=0)
 
 
 @pytest.mark.parametrize("key", ["./scene_a_0001", "abc", "../../evil", "9" * 5000])

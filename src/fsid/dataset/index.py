@@ -3,7 +3,7 @@
     byte of pixel (i, j) = tar member offset + DNG strip offset + 2 (i W + j)
 
 The DNGs inside the shards hold one uncompressed strip of little-endian uint16, so a mosaic is a window of the
-tar file. Indexing reads tar and TIFF headers only.
+tar file. Indexing reads tar and TIFF headers only, and where there is no config.yaml the samples' JSON.
 """
 
 from __future__ import annotations
@@ -62,22 +62,27 @@ class StoredMosaic:
 def index_mosaics(data_dir: str | Path, kind: MosaicKind = "clean") -> tuple[StoredMosaic, ...]:
     """All mosaics of one kind in `data_dir`/shard-*.tar, in the order of shards and samples.
 
-    Raises FsidError where there is no shard, no sample, or a shard or DNG that is not readable as described
-    above.
+    Raises FsidError where there is no shard, no sample, a key that comes twice, or a shard or DNG that is not
+    readable as described above.
     """
     data_dir = Path(data_dir)
     origin = _origin(data_dir)
-    found = tuple(
-        replace(mosaic, scene=scene, split=split)
-        for shard in find_shards(data_dir)
-        for mosaic in _index_shard(shard, f".{kind}.dng")
-        for scene, split in [origin(mosaic)]
-    )
+    found: dict[str, StoredMosaic] = {}
+    for shard in find_shards(data_dir):
+        for mosaic in _index_shard(shard, f".{kind}.dng"):
+            if mosaic.key in found:
+                raise FsidError(
+                    f"{shard}: {mosaic.key} is also in {found[mosaic.key].shard}; to make one dataset of "
+                    f"several, give the samples of one other keys, such as b{mosaic.key}, and leave out "
+                    "config.yaml"
+                )
+            scene, split = origin(mosaic)
+            found[mosaic.key] = replace(mosaic, scene=scene, split=split)
     if not found:
         raise FsidError(
             f"{data_dir}: its shards hold no *.{kind}.dng; make the dataset again with `fsid generate`"
         )
-    return found
+    return tuple(found.values())
 
 
 def identity(data_dir: Path) -> str:

@@ -185,7 +185,7 @@ class PatchDataset(Dataset[Batch]):
             if config.noise == "fresh":
                 noisy[slot] = _exposed(rng, clean[slot], k[slot], sigma2[slot], self._profiles[cameras[slot]])
             else:
-                capture, level = self._noisy[cell.mosaic.key]
+                capture, level = self._noisy[cell.mosaic.shard, cell.mosaic.key]
                 packed(self._around(cell, capture), capture, cut, noisy[slot])
                 level = _transposed(level) if is_transposed else level
                 k[slot], sigma2[slot] = level.k, level.sigma2
@@ -276,17 +276,17 @@ def _training_mosaics(
 
 def _noisy_of(
     data_dir: Path, mosaics: tuple[StoredMosaic, ...]
-) -> dict[str, tuple[StoredMosaic, NoiseLevel]]:
-    """The noisy mosaic of every clean one, by key, and its level; FsidError where they do not fit."""
-    noisy = {mosaic.key: mosaic for mosaic in index_mosaics(data_dir, "noisy")}
+) -> dict[tuple[Path, str], tuple[StoredMosaic, NoiseLevel]]:
+    """By shard and key of a clean mosaic the noisy one and its level; FsidError where they do not fit."""
+    noisy = {(mosaic.shard, mosaic.key): mosaic for mosaic in index_mosaics(data_dir, "noisy")}
     found = {}
     for clean in mosaics:
-        capture = noisy.get(clean.key)
+        capture = noisy.get((clean.shard, clean.key))
         if capture is None or capture.noise is None:
             raise FsidError(f"{clean.shard}: {clean.key} has no noisy image that states its noise")
         if (capture.height, capture.width) != (clean.height, clean.width):
             raise FsidError(f"{clean.shard}: {clean.key} is no denoising pair, its two images differ in size")
-        found[clean.key] = capture, capture.noise
+        found[clean.shard, clean.key] = capture, capture.noise
     return found
 
 
