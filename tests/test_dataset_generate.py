@@ -23,6 +23,7 @@ from fsid.config import load_settings, read_yaml
 from fsid.dataset import (
     GenerateConfig,
     dataset_config,
+    encode,
     generate,
     make_frame,
     make_only,
@@ -116,6 +117,13 @@ def test_settings_of_something_else_are_not_replaced(photos: Path, tmp_path: Pat
     with pytest.raises(FsidError, match=r"config\.yaml: seed"):
         generate(tmp_path, small(f"images={photos}"), count=1)
     assert (tmp_path / "config.yaml").read_text() == "steps: 30\n"
+
+
+def test_a_sample_of_numpys_numbers_is_that_of_pythons(photos: Path):
+    config = small("width=64", "height=64", f"images={photos}")
+    made = encode(make_sample(config, 3, 2, None))
+    assert encode(make_sample(config, np.int64(3), np.uint8(2), None)) == made
+    assert encode(make_frame(config, np.int64(3), np.int32(2), None)[0]) == made
 
 
 def test_there_is_no_sample_before_the_first():

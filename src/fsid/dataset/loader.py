@@ -40,6 +40,7 @@ import torch
 from torch import Tensor
 from torch.utils.data import Dataset
 
+from fsid.config import as_read
 from fsid.dataset.cells import Cell, Grid, check_shrink, shrink_for
 from fsid.dataset.index import StoredMosaic, index_mosaics
 from fsid.dataset.levels import LevelTable
@@ -117,14 +118,14 @@ class PatchDataset(Dataset[Batch]):
         world: int | None = None,
         without: Collection[int] = (),
     ) -> None:
-        data_dir = Path(data_dir)
+        data_dir, seed, config = Path(data_dir), operator.index(seed), as_read(config, source="config")
         if not config.profiles:
             raise FsidError("profiles: name at least one camera profile to draw noise from")
         if seed < 0:
             raise FsidError(f"seed {seed}: must not be negative")
         own_rank, all_ranks = _place_among_processes()
-        self._rank = own_rank if rank is None else rank
-        self._world = all_ranks if world is None else world
+        self._rank = own_rank if rank is None else operator.index(rank)
+        self._world = all_ranks if world is None else operator.index(world)
         if not 0 <= self._rank < self._world:
             raise FsidError(
                 f"rank {self._rank}: is not one of the {self._world} processes that train together"

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import io
 import json
+import operator
 import zlib
 from typing import Any
 
@@ -43,6 +44,7 @@ def make_sample(config: GenerateConfig, seed: int, index: int, renderer: SceneRe
 
 def _place_of(config: GenerateConfig, index: int) -> tuple[int, int]:
     """The frame of a sample, and which of its samples it is."""
+    index = operator.index(index)  # NumPy's numbers are none of JSON's
     if index < 0:
         raise FsidError(f"index {index}: must not be negative")
     return divmod(index, config.pairs_per_frame)
@@ -60,6 +62,7 @@ def make_frame(
     refused: why earlier attempts were, where that is known already.
     FsidError after `ATTEMPTS` attempts that were refused, and for a negative seed or frame.
     """
+    seed, frame = operator.index(seed), operator.index(frame)
     while len(refused) < ATTEMPTS:
         samples = Attempt(config, seed, frame, refused).samples(renderer)
         if isinstance(samples, list):
