@@ -79,7 +79,7 @@ def write_pairs(folder: Path, clean: list[Raw], noisy: list[Raw]) -> Path:
 
 
 def equal(a: Batch, b: Batch) -> bool:
-    return all(torch.equal(getattr(a, name), getattr(b, name)) for name in ("noisy", "clean", "k", "sigma2"))
+    return all(map(torch.equal, a.tensors, b.tensors))
 
 
 def test_the_index_points_at_the_pixels_that_libraw_reads(dataset: Path, tmp_path: Path) -> None:
@@ -455,7 +455,7 @@ def test_numbers_may_be_those_of_numpy(dataset: Path) -> None:
         PatchDataset(dataset, replace(CONFIG, size_px=16.0), seed=0)
 
 
-@pytest.mark.parametrize("wrong", [{"size_px": 0}, {"batch": 0}, {"noise": "Fresh"}])
+@pytest.mark.parametrize("wrong", [{"size_px": 0}, {"batch": 0}, {"noise": "Fresh"}, {"split": "test"}])
 def test_patches_that_are_none_are_refused(wrong: dict) -> None:
     with pytest.raises(FsidError, match=next(iter(wrong))):
         replace(CONFIG, **wrong)
@@ -516,6 +516,31 @@ def test_validation_scenes_and_held_out_ones_are_not_drawn(dataset: Path) -> Non
     assert [mosaic.scene for mosaic in index_mosaics(dataset)] == [0, 0, 1, 1]
     assert PatchDataset(dataset, replace(CONFIG, held_out=1), seed=0).mosaics == 2
     assert PatchDataset(dataset, CONFIG, seed=0, without={0, 9}).mosaics == 2
+
+
+def test_validation_patches_are_of_exactly_the_images_that_training_leaves_out(tmp_path: Path) -> None:
+    """Twelve images of six scenes, of which each third is for validation, and the last image is held out."""
+    data = addresses(tmp_path, (5, 7))
+    settings = GenerateConfig(width=WIDTH, height=HEIGHT, validation_every=3, noise_levels=2)
+    save_settings(DatasetConfig(0, 4, settings), data / "config.yaml")
+    config = replace(CONFIG, size_px=6, batch=8, held_out=3)
+    seen = {}
+    for split in ("train", "validation"):
+        patches = PatchDataset(data, replace(config, split=split), seed=0)
+        steps = range(-(-patches.patches // config.batch))
+        seen[split] = {int(p[0]) // (HEIGHT * WIDTH) for step in steps for p in pixels_of(patches[step])}
+    assert seen == {"train": {0, 1, 2, 3, 6, 7}, "validation": {4, 5, 8, 9, 10, 11}}
+    save_settings(DatasetConfig(0, 4, replace(settings, validation_every=0)), data / "config.yaml")
+    with pytest.raises(FsidError, match="none of its images is for validation; set held_out"):
+        PatchDataset(data, replace(config, held_out=0, split="validation"), seed=0)
+
+
+def test_a_batch_moves_as_a_whole(dataset: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    batch = PatchDataset(dataset, CONFIG, seed=0)[0]
+    assert all(tensor.device.type == "meta" for tensor in batch.to("meta").tensors)
+    monkeypatch.setattr(torch.Tensor, "pin_memory", lambda tensor: tensor + 1)  # what needs a GPU
+    pinned = batch.pin_memory()
+    assert all(torch.equal(pin, own + 1) for pin, own in zip(pinned.tensors, batch.tensors, strict=True))
 
 
 def test_the_table_of_levels_is_the_profile(rng: np.random.Generator) -> None:

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from torch import Tensor
 from torch.utils.data import DataLoader, Dataset
 
 from fsid.dataset.loader import Batch, PatchDataset
@@ -35,7 +34,7 @@ def batches(patches: PatchDataset, steps: range, processes: int = 0, *, pin: boo
         )
         made = (ring[slot] for slot in slots)
     for batch in made:
-        yield Batch(*(tensor.pin_memory() for tensor in _tensors(batch))) if pin else batch
+        yield batch.pin_memory() if pin else batch
 
 
 class _Slots(Dataset[int]):
@@ -54,8 +53,4 @@ class _Slots(Dataset[int]):
 
 
 def _shared(batch: Batch) -> Batch:
-    return Batch(*(tensor.share_memory_() for tensor in _tensors(batch)))
-
-
-def _tensors(batch: Batch) -> tuple[Tensor, ...]:
-    return batch.noisy, batch.clean, batch.k, batch.sigma2
+    return Batch(*(tensor.share_memory_() for tensor in batch.tensors))

@@ -56,6 +56,7 @@ _OPEN_MAPS = 256
 """Each mapped shard holds a file descriptor, of which a process has 1024."""
 
 Noise = Literal["fresh", "stored"]
+Split = Literal["train", "validation"]
 Cut = Callable[[np.ndarray], np.ndarray]
 
 
@@ -68,6 +69,19 @@ class Batch:
     k: Tensor
     sigma2: Tensor
 
+    @property
+    def tensors(self) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """Those above, in their order."""
+        return self.noisy, self.clean, self.k, self.sigma2
+
+    def to(self, device: torch.device | str, *, non_blocking: bool = False) -> Batch:
+        """The batch on a device, as `Tensor.to` brings it there."""
+        return Batch(*(tensor.to(device, non_blocking=non_blocking) for tensor in self.tensors))
+
+    def pin_memory(self) -> Batch:
+        """The batch in page-locked memory, from which a GPU copies faster; PyTorch's loader asks for it."""
+        return Batch(*(tensor.pin_memory() for tensor in self.tensors))
+
 
 @dataclass(frozen=True)
 class PatchConfig:
@@ -75,10 +89,11 @@ class PatchConfig:
 
     size_px: side of a patch in packed pixels (a 2 size_px square of the mosaic). profiles: cameras whose
     noise is drawn, by name or file. iso_min, iso_max: log-uniform range. held_out: so many images at the end
-    of the dataset are not drawn, nor others of their scenes; they are for validation. noise: "fresh" draws it
-    anew every time; "stored" takes the noisy images of the dataset, and profiles and ISO play no part.
-    shrink: how many times smaller images are made, powers of 2; as many patches of each. Empty: 1, 2, 4 ...
-    while the longer side of most images keeps 480 pixels (stored noise: as they are).
+    of the dataset are for validation, with others of their scenes and those that the dataset keeps for it.
+    noise: "fresh" draws it anew every time; "stored" takes the noisy images of the dataset, and profiles and
+    ISO play no part. shrink: how many times smaller images are made, powers of 2; as many patches of each.
+    Empty: 1, 2, 4 ... while the longer side of most images keeps 480 pixels (stored noise: as they are).
+    split: "train" draws from the images that are not for validation, "validation" from those that are.
     """
 
     size_px: int
@@ -89,23 +104,28 @@ class PatchConfig:
     held_out: int = 0
     noise: Noise = "fresh"
     shrink: tuple[int, ...] = (1,)
+    split: Split = "train"
 
     def __post_init__(self) -> None:
         if self.size_px < 1 or self.batch < 1:
             raise FsidError(f"size_px {self.size_px}, batch {self.batch}: must be at least 1")
         if self.noise not in get_args(Noise):
             raise FsidError(f"noise: {self.noise!r} is not one of {', '.join(get_args(Noise))}")
+        if self.split not in get_args(Split):
+            raise FsidError(f"split: {self.split!r} is not one of {', '.join(get_args(Split))}")
         check_shrink(self.shrink)
         if self.noise == "stored" and self.shrink not in ((), (1,)):
             raise FsidError(f"shrink {list(self.shrink)}: stored noise is of the images as they are")
 
 
 class PatchDataset(Dataset[Batch]):
-    """`dataset[step]` is the batch of that step; see the module docstring. Validation scenes are left out.
+    """`dataset[step]` is the batch of that step; see the module docstring.
 
-    `feed.batches` has other processes make them. rank, world: this process among those that train together;
-    None asks `torch.distributed`, and is 0 of 1 where that was not set up. without: numbers of scenes to
-    leave out as well. FsidError: a negative seed or step, and what is wrong with the data or the
+    Steps have no end and the dataset no len(): a loop says which steps it wants, as in `DataLoader(dataset,
+    batch_size=None, sampler=range(1000), num_workers=2)`, or faster, `feed.batches(dataset, range(1000), 2)`.
+    rank, world: this process among those that train together; None asks `torch.distributed`, and is 0 of 1
+    where that was not set up. without: numbers of scenes to hold out as well. FsidError: a negative seed or
+    step, and what is wrong with the data or the
     configuration.
     """
 
@@ -130,7 +150,7 @@ class PatchDataset(Dataset[Batch]):
             raise FsidError(
                 f"rank {self._rank}: is not one of the {self._world} processes that train together"
             )
-        self._mosaics = _training_mosaics(data_dir, config, without)
+        self._mosaics = _mosaics_of_split(data_dir, config, without)
         self._noisy = _noisy_of(data_dir, self._mosaics) if config.noise == "stored" else {}
         self._profiles = [load_bayer_profile(name) for name in config.profiles]
         self._levels = LevelTable(self._profiles, (config.iso_min, config.iso_max))
@@ -262,16 +282,19 @@ def _transposed(level: NoiseLevel) -> NoiseLevel:
     return NoiseLevel(swapped(level.k), swapped(level.sigma2))
 
 
-def _training_mosaics(
+def _mosaics_of_split(
     data_dir: Path, config: PatchConfig, without: Collection[int]
 ) -> tuple[StoredMosaic, ...]:
     found = index_mosaics(data_dir)
     if not 0 <= config.held_out < len(found):
         raise FsidError(f"{data_dir}: has {len(found)} images; held_out {config.held_out} leaves none")
     held_out = {*without, *(mosaic.scene for mosaic in found[len(found) - config.held_out :])}
-    kept = tuple(m for m in found if m.split == "train" and m.scene not in held_out)
-    if not kept:
+    wants_training = config.split == "train"
+    kept = tuple(m for m in found if (m.split == "train" and m.scene not in held_out) == wants_training)
+    if not kept and wants_training:
         raise FsidError(f"{data_dir}: all its images are for validation; generate more scenes")
+    if not kept:
+        raise FsidError(f"{data_dir}: none of its images is for validation; set held_out")
     return kept
 
 

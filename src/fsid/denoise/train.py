@@ -320,10 +320,7 @@ def _step(
     rate: float,
     config: TrainConfig,
 ) -> tuple[float, float]:
-    noisy, clean, k, sigma2 = (
-        tensor.to(accelerator.device, non_blocking=True)
-        for tensor in (batch.noisy, batch.clean, batch.k, batch.sigma2)
-    )
+    noisy, clean, k, sigma2 = batch.to(accelerator.device, non_blocking=True).tensors
     for group in optimizer.param_groups:
         group["lr"] = rate
     optimizer.zero_grad()
