@@ -23,7 +23,7 @@ from fsid.sensor import (
     write_dng,
 )
 from fsid.sensor.metadata import exposure_metadata
-from fsid.sensor.mosaic import unpack
+from fsid.sensor.mosaic import pack, unpack
 from fsid.sensor.poisson import poisson
 from fsid.sensor.terms_fit import dark_finding, prnu_of
 
@@ -284,6 +284,18 @@ def test_drift_of_short_bursts_is_found_on_the_mean():
     level = NoiseLevel(LEVEL.k, (4e-5, 1e-5, 1e-5, 6e-5))
     found = _found_again(NoiseTerms(drift=0.7), level, seeds=100, side=48)
     assert np.mean([terms.drift**2 for terms in found]) == pytest.approx(0.7**2, rel=0.15)
+
+
+def test_banding_keeps_the_variance_of_every_site_and_is_found_again(rng):
+    """Common offsets of one size gave the sites of less noise more than is stated, and the others less."""
+    terms = NoiseTerms(row=0.2, column=0.1, quantisation=False)
+    level = NoiseLevel(LEVEL.k, (4e-5, 1e-5, 1e-5, 6e-5))
+    noisy = [pack(noisy_from_clean(rng, flat(0.0), 800, level, terms).mosaic, "RGGB") for _ in range(FRAMES)]
+    measured = np.var(noisy, axis=0, ddof=1).mean(axis=(1, 2))
+    np.testing.assert_allclose(measured, level.sigma2, rtol=0.03)
+    dark, _ = _dark_and_flat(rng, level, terms, (0.1,) * 4)
+    found = dark_finding(dark, 800, 0.01).terms
+    assert (found.row, found.column) == (pytest.approx(0.2, rel=0.07), pytest.approx(0.1, rel=0.07))
 
 
 @pytest.mark.parametrize("share", [0.0, 0.002])

@@ -42,8 +42,9 @@ class ReadStatistics:
     """Parts of the noise of a burst in DN^2: of a pixel, of its rows and of its columns; excess kurtosis.
 
     pixel_dn2, excess_kurtosis: mean over the sites, of all that a pixel shows. sigma_dn: mean over the sites
-    of the standard deviation before the converter, DN. level_dn2: variance of the frames' levels, as a
-    drifting black level has it.
+    of the standard deviation before the converter, DN; row_dn2, column_dn2: what banding would be in a site
+    of that sigma, since each has banding in proportion to its own. level_dn2: variance of the frames' levels,
+    as a drifting black level has it.
     """
 
     pixel_dn2: float
@@ -166,11 +167,14 @@ class TemporalStatistics:
         second, fourth = self._moments / (self.frames - 1)
         row, column = self._banding / (self.frames - 1)
         kurtosis = fourth[second > 0] / second[second > 0] ** 2
+        sigma = np.sqrt(np.maximum(second / 2 - ROUNDING_DN2, 0)).reshape(2, 2)
+        mean_sigma = float(sigma.mean())
+        in_rows, in_columns = (float((sigma.mean(axis) ** 2).mean()) or 1.0 for axis in (1, 0))
         return ReadStatistics(
             pixel_dn2=float(second.mean()) / 2,
-            sigma_dn=float(np.sqrt(np.maximum(second / 2 - ROUNDING_DN2, 0)).mean()),
-            row_dn2=max(row / 2, 0.0),
-            column_dn2=max(column / 2, 0.0),
+            sigma_dn=mean_sigma,
+            row_dn2=max(row / 2, 0.0) * mean_sigma**2 / in_rows,
+            column_dn2=max(column / 2, 0.0) * mean_sigma**2 / in_columns,
             excess_kurtosis=2 * (float(kurtosis.mean()) - 3) if kurtosis.size else 0.0,
             level_dn2=float(np.var([0.0, *self.offsets_dn], ddof=1)),
         )

@@ -1,7 +1,8 @@
 """What real sensors add to the paper's two parameters; each term can be switched on by itself.
 
     poisson            k Poisson(x / k) instead of sqrt(k x) n: shot noise at a few electrons
-    row, column        shares of sigma2 that all pixels of a row or column have in common: banding
+    row, column        shares of sigma2 that all pixels of a row or column have in common: banding, of every
+                       site in proportion to its own sigma
     tail               excess kurtosis of the pixels' read noise: Student's t, 4 + 6 / tail degrees of freedom
     fixed, prnu        patterns of one unit of the camera: offset in read-noise sigmas, gain relative to 1
     drift              black level from frame to frame, in read-noise sigmas
@@ -88,10 +89,9 @@ def add_noise_terms(
     noisy += np.minimum(raw.mosaic, 0)
     sigma = np.sqrt(sigma2)
     noisy += sigma * np.float32(np.sqrt(1 - terms.row - terms.column)) * _read(pixels, shape, terms.tail)
-    read = float(sigma.mean())
-    noisy += np.float32(np.sqrt(terms.row) * read) * rows.standard_normal((shape[0], 1), np.float32)
-    noisy += np.float32(np.sqrt(terms.column) * read) * columns.standard_normal((1, shape[1]), np.float32)
-    noisy += np.float32(terms.drift * read * level_drift.standard_normal())
+    noisy += sigma * np.float32(np.sqrt(terms.row)) * rows.standard_normal((shape[0], 1), np.float32)
+    noisy += sigma * np.float32(np.sqrt(terms.column)) * columns.standard_normal((1, shape[1]), np.float32)
+    noisy += np.float32(terms.drift * float(sigma.mean()) * level_drift.standard_normal())
     if terms.fixed:
         noisy += np.float32(terms.fixed) * sigma * _pattern(unit, 1, shape)
     if terms.defective:
