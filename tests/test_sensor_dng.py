@@ -87,6 +87,23 @@ def test_libraw_sees_the_same_picture(tmp_path, cfa, preview):
             np.testing.assert_array_equal(file.extract_thumb().data, preview)
 
 
+@pytest.mark.parametrize(
+    ("wrong", "named"),
+    [
+        ({"cfa": "rggb"}, "'rggb' is not a Bayer pattern"),
+        ({"black_level": 64.5}, r"\(64\.5, 1023\) are not whole DN"),
+        ({"white_balance": (0.0, 1.0, 1.5)}, r"white_balance \(0\.0, 1\.0, 1\.5\)"),
+        ({"white_balance": (2.0, 1.0, np.nan)}, "white_balance"),
+        ({"white_balance": (2.0, 1.0)}, "white_balance"),
+    ],
+)
+def test_what_a_dng_does_not_hold_is_named(wrong, named, tmp_path):
+    raw = Raw(np.zeros((4, 4), np.float32), "RGGB", 64, 1023, (2.0, 1.0, 1.5), np.eye(3), camera="Mine")
+    with pytest.raises(FsidError, match=f"Mine: .*{named}"):
+        write_dng(tmp_path / "a.dng", replace(raw, **wrong))
+    assert not list(tmp_path.iterdir())
+
+
 def test_tifffile_reads_the_tags(tmp_path):
     raw = _raw()
     write_dng(tmp_path / "a.dng", raw, PREVIEW)

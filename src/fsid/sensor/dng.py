@@ -27,7 +27,7 @@ from fsid.sensor.colour import published_matrices
 from fsid.sensor.embedded import embedded_directories
 from fsid.sensor.intact import check_intact
 from fsid.sensor.metadata import Metadata, kept_metadata, libraw_metadata, taken
-from fsid.sensor.mosaic import CFA_PATTERNS
+from fsid.sensor.mosaic import CFA_PATTERNS, check_cfa
 from fsid.sensor.quantise import to_dn
 from fsid.sensor.raw import Raw
 from fsid.sensor.tiff import (
@@ -48,13 +48,15 @@ from fsid.sensor.tiff import (
 
 _FULL_IMAGE, _REDUCED_IMAGE = 0, 1  # TIFF NewSubfileType
 _FLOATING_POINT = 3  # TIFF SampleFormat
+_LEAST_GAIN = 1e-3  # of a white balance, whose inverse a DNG's fractions hold
 
 
 def write_dng(target: str | Path | BinaryIO, raw: Raw, preview: np.ndarray | None = None) -> None:
     """Write `raw` as DNG to a path (whole or not at all) or to a binary file.
 
     preview: (h, w, 3) uint8 sRGB, stored as the image that file managers show. Values outside the camera's
-    0..white_level are clipped as the camera would.
+    0..white_level are clipped as the camera would. FsidError for what a DNG does not hold: NaN, a filter
+    pattern that is not Bayer, levels that are no whole DN, gains of a white balance that are 0 or infinite.
     """
     data = _dng_bytes(raw, preview)
     if not isinstance(target, str | Path):
@@ -153,6 +155,7 @@ def _opened(path: Path) -> Iterator[tuple[rawpy.RawPy, _Source]]:
 
 
 def _dng_bytes(raw: Raw, preview: np.ndarray | None) -> bytes:
+    _check_storable(raw)
     dn = to_dn(raw)
     mosaic_tags = image_tags(dn, CFA, _FULL_IMAGE) + dng_tags.mosaic_tags(raw)
     exif_tags = dng_tags.exif_tags(raw)
@@ -164,6 +167,18 @@ def _dng_bytes(raw: Raw, preview: np.ndarray | None) -> bytes:
     mosaic = (SUB_IFD, Directory(mosaic_tags, dn))
     first = image_tags(preview, RGB, _REDUCED_IMAGE) + dng_tags.camera_tags(raw)
     return tiff_bytes(Directory(first, preview, (mosaic, *exif)))
+
+
+def _check_storable(raw: Raw) -> None:
+    check_cfa(raw.cfa, raw.camera)
+    levels = raw.black_level, raw.white_level
+    if not all(isinstance(level, int | np.integer) for level in levels):
+        raise FsidError(
+            f"{raw.camera}: black and white level {levels} are not whole DN, as a DNG states them"
+        )
+    gains = raw.white_balance
+    if len(gains) != 3 or not all(_LEAST_GAIN < gain < math.inf for gain in gains):
+        raise FsidError(f"{raw.camera}: white_balance {gains} must be three finite gains above {_LEAST_GAIN}")
 
 
 @dataclass(frozen=True)
