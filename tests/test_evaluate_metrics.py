@@ -25,6 +25,15 @@ def test_values_outside_the_range_count_as_clipped():
 
 
 @pytest.mark.parametrize("metric", [psnr, ssim])
+@pytest.mark.parametrize("value", [np.inf, -np.inf, np.nan])
+def test_an_image_that_is_not_finite_has_no_figure(metric, value):
+    image, truth = np.full((16, 16, 3), 0.5), np.full((16, 16, 3), 0.4)
+    image[3, 4] = value
+    assert np.isnan(metric(image, truth))
+    assert np.isnan(metric(truth, image))
+
+
+@pytest.mark.parametrize("metric", [psnr, ssim])
 def test_what_has_no_range_of_one_or_another_shape_is_refused(metric):
     """Clipped to 0..1, two 8-bit pictures without black are both white, and equal."""
     grey, light = (np.full((16, 16, 3), value, np.uint8) for value in (100, 200))

@@ -16,11 +16,15 @@ _WINDOW_PX = 11
 
 
 def psnr(image: np.ndarray, truth: np.ndarray) -> float:
-    """Peak signal-to-noise ratio in dB of two arrays of equal shape, 0..1; inf where equal, NaN of NaN.
+    """Peak signal-to-noise ratio in dB of two arrays of equal shape, 0..1; inf where equal.
+
+    NaN where a value is infinite or NaN: clipped, an image of such values would be white, and comparable.
 
     FsidError for arrays of different shapes or of integers.
     """
     _check_alike(image, truth)
+    if not (np.isfinite(image).all() and np.isfinite(truth).all()):
+        return float("nan")
     error = np.mean(np.square(np.clip(image, 0, 1) - np.clip(truth, 0, 1), dtype=np.float64))
     return float(-10.0 * np.log10(error)) if error != 0 else float("inf")
 
@@ -28,6 +32,7 @@ def psnr(image: np.ndarray, truth: np.ndarray) -> float:
 def ssim(image: np.ndarray, truth: np.ndarray) -> float:
     """Structural similarity (Wang et al. 2004) of two (H, W, 3) images, range 0..1, mean over channels.
 
+    NaN as in `psnr`.
     FsidError for images of different shapes, of integers, or of less than 11x11 pixels.
     """
     _check_alike(image, truth)
@@ -35,6 +40,8 @@ def ssim(image: np.ndarray, truth: np.ndarray) -> float:
         raise FsidError(
             f"SSIM takes (H, W, 3) images of at least {_WINDOW_PX}x{_WINDOW_PX}, not {image.shape}"
         )
+    if not (np.isfinite(image).all() and np.isfinite(truth).all()):
+        return float("nan")
     return float(
         structural_similarity(
             np.clip(image, 0, 1),
