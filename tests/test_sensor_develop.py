@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from PIL import Image, ImageOps
 
 from fsid.cli.main import main
+from fsid.errors import FsidError
 from fsid.sensor import (
     CFA_PATTERNS,
     Raw,
@@ -28,7 +29,7 @@ from fsid.sensor import (
 )
 from fsid.sensor.colour import published_matrices
 from fsid.sensor.metadata import exposure_metadata
-from fsid.sensor.tone import tone_curve
+from fsid.sensor.tone import inverse_tone_curve, photo_to_linear, srgb_decode, tone_curve
 
 cfas = pytest.mark.parametrize("cfa", CFA_PATTERNS)
 
@@ -73,6 +74,19 @@ def _reference_demosaic(image: np.ndarray, cfa: str) -> np.ndarray:
 def test_demosaic_equals_the_published_filters(cfa, size):
     image = np.random.default_rng(0).uniform(-0.2, 1, size).astype(np.float32)
     np.testing.assert_allclose(demosaic(image, cfa), _reference_demosaic(image, cfa), atol=2e-6)
+
+
+@pytest.mark.parametrize("shape", [(5, 4), (4, 7), (4, 4, 1)])
+def test_a_mosaic_of_broken_tiles_is_not_demosaiced(shape):
+    with pytest.raises(FsidError, match="even height and width"):
+        demosaic(np.zeros(shape, np.float32), "RGGB")
+    assert demosaic(np.zeros((2, 4), np.float32), "RGGB").shape == (2, 4, 3)
+
+
+@pytest.mark.parametrize("curve", [srgb_encode, srgb_decode, tone_curve, inverse_tone_curve, photo_to_linear])
+@pytest.mark.parametrize("number", [0, 0.5, 1])
+def test_curves_take_single_numbers(curve, number):
+    assert curve(number) == curve(np.array([number], np.float32))[0]
 
 
 @cfas

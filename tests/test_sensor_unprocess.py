@@ -98,6 +98,8 @@ def test_matrices_keep_grey_and_invert_each_other():
 def test_colour_rand_blends_inside_the_published_cameras():
     rng = np.random.default_rng(0)
     matrices = published_matrices()
+    with pytest.raises(FsidError, match=r"xyz_to_camera has shape \(3, 3\); expected \(m, 3, 3\)"):
+        colour_rand(rng, matrices[0])
     draws = [colour_rand(rng, matrices) for _ in range(300)]
     blends = np.array([matrix for matrix, _ in draws])
     assert np.all(blends >= matrices.min(axis=0) - 1e-12)

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import yaml
 
+from fsid.errors import FsidError
 from fsid.sensor.arrays import like
 
 # IEC 61966-2-1, linear sRGB -> XYZ, D65, the rounding that Brooks et al. use.
@@ -64,7 +65,10 @@ def colour_rand(
 
     The matrix is a random convex blend of `xyz_to_camera` (m, 3, 3), the gains are uniform over
     `RED_GAIN_RANGE` and `BLUE_GAIN_RANGE` (Brooks et al. 2019). Brightness is not drawn here; see `exposure`.
+    FsidError for matrices of another shape, such as a single one: give [matrix].
     """
+    if np.shape(xyz_to_camera)[1:] != (3, 3):
+        raise FsidError(f"xyz_to_camera has shape {np.shape(xyz_to_camera)}; expected (m, 3, 3)")
     weights = rng.uniform(size=len(xyz_to_camera))
     blend = np.tensordot(weights / weights.sum(), xyz_to_camera, axes=1)
     return blend, (float(rng.uniform(*RED_GAIN_RANGE)), 1.0, float(rng.uniform(*BLUE_GAIN_RANGE)))

@@ -12,13 +12,15 @@ from __future__ import annotations
 import numpy as np
 
 from fsid.sensor.mosaic import site_offsets
+from fsid.sensor.raw import check_even
 
 _PAD = 2  # the filters are 5x5; reflection without the edge pixel keeps the CFA phase
 _STRIP = 64  # rows at once, an even number: what is in between stays in the cache
 
 
 def demosaic(mosaic: np.ndarray, cfa: str) -> np.ndarray:
-    """Mosaic (H, W), both even and at least 4, to camera RGB (H, W, 3) float32; measured samples are kept."""
+    """Mosaic (H, W) to camera RGB (H, W, 3) float32; FsidError unless both are even. Samples are kept."""
+    check_even(mosaic.shape)
     padded = np.pad(mosaic.astype(np.float32, copy=False), _PAD, mode="reflect")
     out = np.empty((*mosaic.shape, 3), np.float32)
     for first in range(0, len(mosaic), _STRIP):

@@ -1,4 +1,4 @@
-"""Display curves and their inverses, on 0..1.
+"""Display curves and their inverses, on 0..1, of numbers, NumPy arrays and tensors.
 
     sRGB (IEC 61966-2-1):  e(v) = 12.92 v  up to v = 0.0031308,  else  1.055 v^(1/2.4) - 0.055
     tone curve (Brooks et al. 2019, eq. 1):  s(v) = 3 v^2 - 2 v^3,   s^-1(y) = 1/2 - sin(asin(1 - 2 y) / 3)
@@ -50,8 +50,9 @@ def tone_curve(image: Any) -> Any:
 
 def inverse_tone_curve(image: Any) -> Any:
     """Inverse of `tone_curve` on 0..1, float32."""
-    xp = namespace(image)
-    return 0.5 - xp.sin(xp.arcsin(1 - 2 * _unit(image)) / 3)
+    v = _unit(image)
+    xp = namespace(v)
+    return 0.5 - xp.sin(xp.arcsin(1 - 2 * v) / 3)
 
 
 def photo_to_linear(srgb: Any) -> Any:
@@ -67,6 +68,6 @@ def _photo_table() -> np.ndarray:
 
 
 def _unit(image: Any) -> Any:
-    if isinstance(image, np.ndarray | np.generic):
+    if isinstance(image, np.ndarray | np.generic | float | int):
         return np.clip(image, 0, 1, dtype=np.float32)
     return image.float().clip(0, 1)
