@@ -96,6 +96,8 @@ def test_folders_and_cameras_are_taken_as_named(photos: Path, tmp_path: Path):
     generated = read_yaml(data / "config.yaml")["generate"]
     assert (generated["images"], generated["cameras"]) == (str(folder), [str(camera)])
     assert min(generated["width"], generated["height"]) > max(config.width, config.height)  # never cut small
+    assert _training(config, 3).profiles == (str(camera),)
+    assert _training(scale_config("ablation", "cpu"), 3).profiles == ("pixel6",)
 
 
 def test_sources_of_all_sizes_are_trained_on_alike(tmp_path: Path):
@@ -117,6 +119,9 @@ def test_sources_of_all_sizes_are_trained_on_alike(tmp_path: Path):
         (["ablation", "--camera", "nosuch"], "profile 'nosuch'"),
         (["ablation", "--network", "nosuch"], "nosuch: cannot be read"),
         (["ablation", "--set", "nokey=1"], "no such key: nokey"),
+        (["ablation", "--set", "scene.objects=[1,2]", "variant=objects"], "--set variant: is no setting of"),
+        (["ablation", "--set", "images=materials"], "--set images: is no setting of the scenes"),
+        (["ablation", "--set", "cameras=[galaxy-s22]"], "--set cameras: is no setting of the scenes"),
         (["ablation", "--width", "101"], "width: 101"),
         (["real-vs-synthetic", "--photos", "."], "holds no picture"),
         (["ablation", "--test", "."], "holds no photograph"),

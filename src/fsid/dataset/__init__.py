@@ -1,7 +1,7 @@
 """Samples, shards on disk, and training patches from them."""
 
 from fsid.dataset.attempt import Sample, sample_key
-from fsid.dataset.config import DatasetConfig, GenerateConfig, generate_config
+from fsid.dataset.config import RENDERED, DatasetConfig, GenerateConfig, generate_config
 from fsid.dataset.estimate import Estimate, estimate
 from fsid.dataset.generate import Workforce, dataset_config, generate, is_begun
 from fsid.dataset.given import check_given
@@ -13,6 +13,7 @@ from fsid.dataset.sample import encode, make_frame, make_sample, remake, scene_o
 from fsid.dataset.shards import find_shards, read_member, shard_keys, shard_path, write_shard
 
 __all__ = [
+    "RENDERED",
     "DatasetConfig",
     "Estimate",
     "GenerateConfig",

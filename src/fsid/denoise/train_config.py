@@ -9,7 +9,7 @@ from importlib.resources import as_file, files
 from pathlib import Path
 from typing import Literal
 
-from fsid.config import load_settings
+from fsid.config import Override, load_settings
 from fsid.dataset.cells import check_shrink
 from fsid.denoise.raw_denoiser import MAX_PATCH_PX, NetworkConfig
 from fsid.errors import FsidError
@@ -99,8 +99,8 @@ class TrainConfig:
             )
 
 
-def train_config(name_or_file: str | Path, overrides: Sequence[str] = ()) -> TrainConfig:
-    """A built-in configuration by name (`fsid/configs`), or a YAML file; `key=value` overrides on top."""
+def train_config(name_or_file: str | Path, overrides: Sequence[Override] = ()) -> TrainConfig:
+    """A built-in configuration by name (`fsid/configs`), or a YAML file; overrides on top."""
     builtin = files("fsid.configs").joinpath(f"{name_or_file}.yaml")
     if not builtin.is_file():
         return load_settings(TrainConfig, Path(name_or_file), overrides)

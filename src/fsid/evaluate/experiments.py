@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Literal
 
 from fsid.config import Override, load_settings
-from fsid.dataset import GenerateConfig, check_pictures, find_photos, find_pictures, generate
+from fsid.dataset import RENDERED, GenerateConfig, check_pictures, find_photos, find_pictures, generate
 from fsid.denoise import TrainConfig, train, train_config
 from fsid.errors import FsidError
 from fsid.evaluate.claim import claim
@@ -52,6 +52,7 @@ SOURCES: dict[Kind, tuple[str, ...]] = {
 }
 _PHOTOGRAPH_PX = 1024
 """Windows of photographs are at least so large: small frames suit scenes, but would only cut pictures."""
+_NOT_OF_SCENES = {field.name for field in fields(GenerateConfig)} - {*RENDERED, "checks"} | {"variant"}
 MATERIALS_SET = "materials"
 TEST_ISOS = (800, 1600, 3200, 6400)
 
@@ -65,7 +66,8 @@ class ExperimentConfig:
     the configuration `network` (a built-in name or a YAML file). seeds: one training per source and seed.
     photos: folder to train the real rival on. tests: folders of photographs to measure on, beside the
     simulated materials (materials_scenes pictures of each, test_width x test_height).
-    settings: `key=value` of the generator, for every source of scenes.
+    camera: noise profile of data, trainings and tests. settings: `key=value` of the generator that say how
+    scenes are, for every source of scenes. train_settings: of every training.
     """
 
     kind: Kind
@@ -93,6 +95,9 @@ class ExperimentConfig:
             raise FsidError(f"--seeds {' '.join(map(str, self.seeds))}: must be at least 0 and below 2^64")
         if self.kind == "real-vs-synthetic" and not self.photos:
             raise FsidError("--photos: name the folder of photographs that the real rival is trained on")
+        for key in (setting.partition("=")[0] for setting in self.settings):
+            if key.partition(".")[0] in _NOT_OF_SCENES:
+                raise FsidError(f"--set {key}: is no setting of the scenes alone; rivals share all others")
         names = [MATERIALS_SET, ALL_SETS, *(_set_name(folder) for folder in self.tests)]
         for folder, name in zip(self.tests, names[2:], strict=True):
             if names.count(name) > 1:
@@ -171,7 +176,8 @@ def _check(out: Path, config: ExperimentConfig, bar: ProgressBar, workers: int) 
 
 def _training(config: ExperimentConfig, seed: int) -> TrainConfig:
     steps = [f"steps={config.steps}"] if config.steps else []
-    training = train_config(config.network, [f"seed={seed}", *config.train_settings, *steps])
+    noise: list[Override] = [("profiles", [config.camera])]
+    training = train_config(config.network, [*noise, f"seed={seed}", *config.train_settings, *steps])
     # scenes and photographs differ in size, and their trainings must not
     return training if training.shrink else replace(training, shrink=(1,))
 
