@@ -34,6 +34,8 @@ from fsid.dataset import (
     shard_path,
 )
 from fsid.errors import FsidError
+from fsid.sensor import NoiseTerms, load_profile, save_profile
+from fsid.sensor.light import LONGEST_EXPOSURE_S
 
 SMALL = ["width=128", "height=96"]
 
@@ -165,6 +167,34 @@ def test_photographs_go_through_the_same_chain(photos: Path, tmp_path: Path):
     assert digests(tmp_path / "one") == digests(tmp_path / "two")
     record = json.loads(read_member(shard_path(tmp_path / "one", 0), "00000004.json"))
     assert record["image"] == "coffee-1.png"
+
+
+def with_terms(file: Path, terms: NoiseTerms) -> str:
+    save_profile(file, replace(load_profile("pixel6"), terms=terms))
+    return f"cameras=[{file}]"
+
+
+def test_every_frame_is_of_another_specimen_of_the_camera(photos: Path, tmp_path: Path):
+    cameras = with_terms(tmp_path / "broken.yaml", NoiseTerms(defective=0.05))
+    config = small(f"images={photos}", cameras, "noise_levels=2")
+    samples = [make_sample(config, 0, i, None) for i in range(4)]
+    units = [sample.record["unit"] for sample in samples]
+    assert units[0] == units[1] != units[2] == units[3]
+    for one, two in (samples[:2], samples[2:]):
+        broken = np.random.default_rng([one.record["unit"], 2]).random((96, 128), np.float32) < 0.05
+        assert np.array_equal(one.noisy.mosaic[broken], two.noisy.mosaic[broken])
+        assert np.mean(one.noisy.mosaic[~broken] == two.noisy.mosaic[~broken]) < 0.2
+
+
+def test_dark_current_flows_for_the_longest_exposure(photos: Path, tmp_path: Path):
+    dark = with_terms(tmp_path / "dark.yaml", NoiseTerms(dark_current_e_s=1000.0))
+    sample, without = (
+        make_sample(small(f"images={photos}", cameras), 0, 0, None) for cameras in (dark, "cameras=[pixel6]")
+    )
+    assert sample.record["exposure_s"] == LONGEST_EXPOSURE_S
+    assert not {"exposure_s", "unit"} & without.record.keys()
+    brighter = np.mean(sample.noisy.mosaic - without.noisy.mosaic)
+    assert brighter == pytest.approx(100 * np.mean(sample.record["k"]), rel=0.05)
 
 
 def test_photographs_are_the_same_data_whatever_scenes_would_be(photos: Path, tmp_path: Path):

@@ -7,8 +7,8 @@ import pytest
 
 from fsid.errors import FsidError
 from fsid.evaluate import photo_testset
-from fsid.sensor import Raw, dimmed, light_level, load_profile, read_raw, save_profile
-from fsid.sensor.light import KEY, PHOTONS_PER_LUX_M2_S, electrons_per_second
+from fsid.sensor import NoiseTerms, Raw, dimmed, light_level, load_profile, read_raw, save_profile
+from fsid.sensor.light import KEY, LONGEST_EXPOSURE_S, PHOTONS_PER_LUX_M2_S, electrons_per_second
 
 PIXEL = load_profile("pixel6")
 
@@ -64,6 +64,18 @@ def test_the_test_bench_takes_lux(photos, tmp_path):
     capture = read_raw(tmp_path / testset.images[0].name / "0.5lux.noisy.dng")
     grey_electrons = KEY / np.mean(PIXEL.level(capture.iso).k[1:3])
     assert grey_electrons == pytest.approx(light_level(PIXEL, 0.5).electrons, rel=1e-3)
+
+
+def test_dark_current_flows_at_an_iso_as_it_does_in_lux(photos, tmp_path):
+    means = []
+    for terms in (NoiseTerms(dark_current_e_s=1000.0), NoiseTerms()):
+        save_profile(tmp_path / "camera.yaml", replace(PIXEL, terms=terms))
+        out = tmp_path / f"{terms.dark_current_e_s:g}"
+        testset = photo_testset([photos], out, camera=tmp_path / "camera.yaml", isos=[800])
+        captures = testset.captures(out)
+        means.append(np.mean([read_raw(capture).mosaic.mean() for capture in captures]))
+    electrons = 1000 * LONGEST_EXPOSURE_S
+    assert means[0] - means[1] == pytest.approx(electrons * np.mean(PIXEL.level(800).k), rel=0.05)
 
 
 def test_what_cannot_be_computed_is_named(tmp_path):

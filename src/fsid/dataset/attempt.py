@@ -41,8 +41,9 @@ from fsid.sensor import (
     load_profile,
     noisy_from_clean,
 )
+from fsid.sensor.light import LONGEST_EXPOSURE_S
 
-_SCENE, _CROP, _EXPOSURE, _COLOUR, _NOISE, _TASK = range(6)
+_SCENE, _CROP, _EXPOSURE, _COLOUR, _NOISE, _TASK, _UNIT = range(7)
 _WINDOWS = 3
 """So many windows of a picture are judged as frames of scenes are."""
 _NOTHING = 0.99
@@ -148,7 +149,8 @@ class Attempt:
                 raise ValueError("a renderer is needed to make samples from scenes")
             scene = self.drawn_scene()
             facts = {"split": split_of(config, self.frame), "scene": to_plain(scene)}
-            return _Source(views_of_scene(rng, config, scene, renderer), facts, is_linear=True)
+            views, shutter_s = views_of_scene(rng, config, scene, renderer), scene.cameras[0].exposure_s
+            return _Source(views, facts, is_linear=True, exposure_s=shutter_s or LONGEST_EXPOSURE_S)
         number, path = self.drawn_picture()
         check_task(config, [path])
         picture = read_picture(path)
@@ -160,7 +162,7 @@ class Attempt:
         rng = self._rng(_EXPOSURE, number)
         profile = load_profile(self.config.cameras[rng.integers(len(self.config.cameras))])
         gains = exposure_rand(rng, source.views.truth) if source.is_linear else None
-        return _Shot(profile, gains, self._stream(_COLOUR, number))
+        return _Shot(profile, gains, source.exposure_s, self._stream(_COLOUR, number))
 
     def _window(self, views: Views, number: int) -> Window:
         width, height = self.config.crop_width, self.config.crop_height
@@ -179,10 +181,13 @@ class Attempt:
         """One sample per noise level of a crop and exposure."""
         config, profile = self.config, shot.profile
         crop, exposure = place
+        specimen = self._specimen(place, shot)
         for number in range(config.noise_levels):
             rng = self._rng(_NOISE, crop, exposure, number)
             iso, level = level_rand(rng, profile, config.iso_range)
-            noisy, *others = (noisy_from_clean(rng, raw, iso, level, profile.terms) for raw in inputs)
+            noisy, *others = (
+                noisy_from_clean(rng, raw, iso, level, profile.terms, **specimen) for raw in inputs
+            )
             index = (
                 (self.frame * config.crops + crop) * config.exposures + exposure
             ) * config.noise_levels + number
@@ -204,6 +209,7 @@ class Attempt:
                 "iso": iso,
                 "k": list(level.k),
                 "sigma2": list(level.sigma2),
+                **specimen,
                 **facts,
                 "settings": to_plain(config),
             }
@@ -212,6 +218,19 @@ class Attempt:
                 more["degraded"] = inputs[0]
             more |= {name: _half_precision(each) for name, each in flow.items()}
             yield Sample(sample_key(index), clean, noisy, record, more)
+
+    def _specimen(self, place: tuple[int, int], shot: _Shot) -> dict[str, Any]:
+        """What the terms of the profile depend on beside the level, as far as it has such terms.
+
+        Each crop is a part of the sensor with patterns of its own.
+        """
+        terms = shot.profile.terms
+        facts: dict[str, Any] = {}
+        if terms.fixed or terms.prnu or terms.defective:
+            facts["unit"] = int(self._rng(_UNIT, *place).integers(2**31))
+        if terms.dark_current_e_s:
+            facts["exposure_s"] = shot.exposure_s
+        return facts
 
     def _stream(self, *place: int) -> np.random.SeedSequence:
         return np.random.SeedSequence(self.seed, spawn_key=(self.frame, len(self.refused), *place))
@@ -230,11 +249,16 @@ def _half_precision(flow: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _Source:
-    """What a frame is made of, a scene or a picture, and where it is from."""
+    """What a frame is made of, a scene or a picture, and where it is from.
+
+    exposure_s: the scene's own shutter time where it has one, else that of auto-exposure in low light, which
+    takes the longest before it raises the ISO.
+    """
 
     views: Views
     facts: dict[str, Any]
     is_linear: bool
+    exposure_s: float = LONGEST_EXPOSURE_S
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,6 +267,7 @@ class _Shot:
 
     profile: CameraProfile
     gains: np.ndarray | None
+    exposure_s: float
     colour: np.random.SeedSequence
 
     def clean(self, image: np.ndarray) -> Raw:

@@ -37,6 +37,7 @@ from fsid.sensor import (
     noisy_from_clean,
     write_dng,
 )
+from fsid.sensor.light import LONGEST_EXPOSURE_S
 
 Progress = Callable[[int, int], None]
 
@@ -169,7 +170,10 @@ def as_text(name: str) -> str:
 
 
 class Setting(NamedTuple):
-    """What the camera is set to at a level; the exposure time matters for dark current only."""
+    """What the camera is set to at a level; the exposure time matters for dark current only.
+
+    Where an ISO is given, it is the longest: auto-exposure takes that before it raises the ISO.
+    """
 
     iso: float
     exposure_s: float
@@ -180,7 +184,9 @@ def levels_of(profile: CameraProfile, isos: Iterable[float], luxes: Iterable[flo
     isos, luxes = tuple(isos), tuple(luxes)
     if not (isos or luxes) or not all(0 < level < np.inf for level in (*isos, *luxes)):
         raise FsidError("--iso: at least one positive ISO (or --lux) is needed, and no infinite one")
-    levels = {f"iso{int(iso) if iso == int(iso) else iso}": Setting(float(iso), 0.0) for iso in isos}
+    levels = {
+        f"iso{int(iso) if iso == int(iso) else iso}": Setting(float(iso), LONGEST_EXPOSURE_S) for iso in isos
+    }
     for lux in luxes:
         light = light_level(profile, lux, highest_iso=np.inf)
         levels[f"{lux:g}lux"] = Setting(light.iso, light.exposure_s)
