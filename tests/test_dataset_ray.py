@@ -14,6 +14,7 @@ from PIL import Image
 pytest.importorskip("ray")
 
 from fsid.dataset import GenerateConfig, Workforce, generate
+from fsid.dataset.ray_crew import _Member
 from fsid.errors import FsidError
 
 
@@ -69,6 +70,37 @@ def test_lost_actors_change_nothing(tmp_path: Path) -> None:
         p.name: p.read_bytes() for p in calm.glob("*.tar")
     }
     assert not list(out.glob(".*.part"))
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_relative_paths_mean_the_same_to_actors(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Wherever the cluster was started: there may be folders of the same names."""
+    elsewhere, here = tmp_path / "elsewhere", tmp_path / "here"
+    for value, folder in enumerate((elsewhere, here)):
+        (folder / "pictures").mkdir(parents=True)
+        (folder / "out").mkdir()
+        Image.new("RGB", (64, 64), (90 + 60 * value, 120, 60)).save(folder / "pictures" / "a.png")
+    config = GenerateConfig(images="pictures", width=32, height=32)
+    import ray
+
+    monkeypatch.chdir(elsewhere)
+    ray.init(address="local", num_cpus=1, log_to_driver=False, logging_level="ERROR")
+    try:
+        monkeypatch.chdir(here)
+        generate("out", config, count=1, workforce=Workforce(ray="local"))
+    finally:
+        ray.shutdown()
+    generate("calm", config, count=1)
+    assert not list((elsewhere / "out").iterdir())
+    names = ("shard-00000.tar", "config.yaml")
+    assert all((here / "out" / name).read_bytes() == (here / "calm" / name).read_bytes() for name in names)
+
+
+def test_a_machine_without_the_folder_is_one_line(tmp_path: Path) -> None:
+    member = _Member(lambda gpu: str, False, str(tmp_path / "gone"))
+    result = member.do("task")
+    assert isinstance(result, FsidError)
+    assert f"cannot work in {tmp_path / 'gone'} (No such file" in str(result)
 
 
 def test_a_cluster_that_does_not_answer_is_one_line(tmp_path: Path) -> None:

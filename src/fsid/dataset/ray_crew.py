@@ -1,12 +1,14 @@
 """The crew of `crew.py` on a Ray cluster: one actor per worker.
 
 Actors are used and not `ray.util.multiprocessing.Pool`, which goes on giving tasks to an actor that died. The
-cluster's machines need the same FSID installed and the dataset's folder under the same path.
+cluster's machines need the same FSID installed and every folder under the same path. Actors work in the
+folder of the process that made the crew, so that relative paths mean the same to all.
 """
 
 from __future__ import annotations
 
 import logging
+import os
 import socket
 from collections.abc import Sequence
 from typing import Any
@@ -20,13 +22,24 @@ _PATIENCE_S = 5.0
 class _Member:
     """What runs on the cluster."""
 
-    def __init__(self, make_work: MakeWork, has_gpu: bool) -> None:
+    def __init__(self, make_work: MakeWork, has_gpu: bool, folder: str) -> None:
         import ray
 
         self._work = make_work(_gpu_number(ray.get_gpu_ids()) if has_gpu else None)
+        self._folder = folder
 
     def do(self, task: Any) -> Any:
-        return do_task(self._work, task)
+        return do_task(self._do_in_folder, task)
+
+    def _do_in_folder(self, task: Any) -> Any:
+        try:
+            os.chdir(self._folder)
+        except OSError as error:
+            raise FsidError(
+                f"--ray: {socket.gethostname()} cannot work in {self._folder} ({error.strerror}); "
+                "run the command in a folder that all machines have"
+            ) from None
+        return self._work(task)
 
 
 def _gpu_number(ids: Sequence[Any]) -> int | None:
@@ -46,7 +59,7 @@ class RayCrew:
         import ray
 
         _check_reachable(address)
-        self._ray, self._size, self._make_work = ray, size, make_work
+        self._ray, self._size, self._make_work, self._folder = ray, size, make_work, os.getcwd()
         self._owns = not ray.is_initialized()
         try:
             if self._owns:
@@ -72,7 +85,7 @@ class RayCrew:
     def start(self, worker: int) -> None:
         if worker in self._members:
             self._ray.kill(self._members[worker])
-        self._members[worker] = self._actor.remote(self._make_work, self._has_gpu)
+        self._members[worker] = self._actor.remote(self._make_work, self._has_gpu, self._folder)
 
     def send(self, worker: int, task: Any) -> None:
         self._pending[self._members[worker].do.remote(task)] = worker
