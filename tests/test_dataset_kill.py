@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import random
 import resource
@@ -188,6 +189,25 @@ def test_a_run_keeps_others_out_of_its_folder(tiny: list[str], tmp_path: Path) -
     finally:
         process.kill()
         process.communicate()
+
+
+def test_without_locks_a_run_leaves_the_others_their_files(
+    tiny: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As on some network file systems: another may be at work, but no more after a day."""
+
+    def no_locks(*_: object) -> None:
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr("fsid.files.fcntl.flock", no_locks)
+    fresh, old = (tmp_path / f".shard-00001.tar.elsewhere-{pid}.part" for pid in (1, 2))
+    for part in (fresh, old):
+        part.write_bytes(b"half a")
+    os.utime(old, (0, 0))
+    finish(tmp_path, tiny, 8, SHARD)
+    assert fresh.exists()
+    assert not old.exists()
+    assert len(content(tmp_path)) == 2
 
 
 def test_a_full_disk_is_one_line_and_the_next_run_finishes(tiny: list[str], tmp_path: Path) -> None:

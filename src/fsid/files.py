@@ -46,10 +46,11 @@ def check_folder(folder: Path) -> None:
 
 
 @contextlib.contextmanager
-def held(folder: Path, taken: str) -> Iterator[None]:
+def held(folder: Path, taken: str) -> Iterator[bool]:
     """`folder` exists and is this process's until the end of the block, or until it dies.
 
-    FsidError where it cannot be made, or where another process has it: `taken` says what that does.
+    Yields whether that is sure: some network file systems know no locks. FsidError where it cannot be made,
+    or where another process has it: `taken` says what that does.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -59,10 +60,11 @@ def held(folder: Path, taken: str) -> Iterator[None]:
     try:
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            alone = True
         except BlockingIOError:
             raise FsidError(f"{folder}: {taken}; wait for it or stop it") from None
         except OSError:
-            pass  # a network file system without locks
-        yield
+            alone = False
+        yield alone
     finally:
         os.close(descriptor)

@@ -32,6 +32,9 @@ SHARD_SIZE = 16
 SAMPLES_PER_WORKER = 320
 """After so many a worker is replaced, so that whatever a driver leaks stays small."""
 
+DEAD_AFTER_S = 86400
+"""Where there are no locks, a file that was not written to for so long is of a process that died."""
+
 
 @dataclass(frozen=True)
 class Workforce:
@@ -161,13 +164,14 @@ def dataset_config(config: GenerateConfig, seed: int, shard_size: int = 0) -> Da
 
 @contextmanager
 def _locked(out: Path) -> Iterator[None]:
-    """`out` is this process's, and free of what an interrupted one left."""
-    with held(out, "another fsid generate is filling it"):
-        remove_parts(out)
+    """`out` is this process's, and free of what an interrupted one left, if that is sure to be dead."""
+    with held(out, "another fsid generate is filling it") as alone:
+        unused_s = 0 if alone else DEAD_AFTER_S
+        remove_parts(out, unused_s)
         try:
             yield
         finally:
-            remove_parts(out)
+            remove_parts(out, unused_s)
 
 
 def _withdraw_card(out: Path) -> None:

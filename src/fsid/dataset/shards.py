@@ -12,8 +12,9 @@ import json
 import os
 import socket
 import tarfile
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -30,11 +31,17 @@ def part_path(path: Path) -> Path:
     return path.with_name(f".{path.name}.{socket.gethostname()}-{os.getpid()}.part")
 
 
-def remove_parts(folder: Path) -> None:
-    """Remove what killed writers left in a dataset's folder. One that still writes fails, harmlessly."""
+def remove_parts(folder: Path, unused_s: float = 0) -> None:
+    """Remove what killed writers left in a dataset's folder, if nobody wrote to it for `unused_s` seconds.
+
+    A writer that is alive after all fails, harmlessly.
+    """
+    latest = time.time() - unused_s
     for pattern in (".shard-*.part", "config.yaml*.part", "README.md*.part", "samples.png*.part"):
         for part in folder.glob(pattern):
-            part.unlink(missing_ok=True)
+            with suppress(FileNotFoundError):  # its writer was faster
+                if not unused_s or part.stat().st_mtime < latest:
+                    part.unlink()
 
 
 def find_shards(folder: str | Path) -> list[Path]:
