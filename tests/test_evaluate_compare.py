@@ -31,6 +31,8 @@ from fsid.evaluate.compare import Row, confidence
 from fsid.evaluate.comparison_report import comparison_sections
 from fsid.evaluate.models import model_names
 from fsid.evaluate.report import METRICS, level_label, write_report
+from fsid.evaluate.testset import staged
+from fsid.files import write_atomically
 from fsid.sensor import Raw, read_raw
 
 
@@ -362,3 +364,40 @@ def test_a_confidence_interval_is_student_s():
     """Of 0 and 2: t = 12.706 with one degree of freedom, standard error 1; of 1, 2, 3: 4.303 / sqrt 3."""
     assert confidence([0.0, 2.0]) == pytest.approx(12.706, abs=1e-3)
     assert confidence([1.0, 2.0, 3.0]) == pytest.approx(4.3027 / np.sqrt(3), abs=1e-3)
+
+
+def test_two_cannot_fill_one_folder(photos: Path, tmp_path: Path):
+    out = tmp_path / "set"
+    with staged(out) as root:
+        (root / "mine").mkdir()
+        with pytest.raises(FsidError, match="another fsid testset is filling it"):
+            photo_testset([photos], out, camera="pixel6", isos=[800])
+    assert [path.name for path in out.iterdir()] == ["mine"]
+
+
+def test_a_test_set_fills_the_folder_that_is_there(photos: Path, tmp_path: Path, monkeypatch):
+    """A mount point and the aim of a link stay what they are; what a killed run left there is no content."""
+    folder, link = tmp_path / "folder", tmp_path / "link"
+    (folder / ".testset.part" / "0000-coffee").mkdir(parents=True)
+    link.symlink_to(folder)
+    before = folder.stat().st_ino
+    moved: list[str] = []
+    rename = Path.rename
+    monkeypatch.setattr(
+        Path, "rename", lambda path, target: (moved.append(path.name), rename(path, target))[1]
+    )
+    photo_testset([photos], link, camera="pixel6", isos=[800])
+    assert folder.stat().st_ino == before
+    assert link.is_symlink()
+    assert len(read_testset(folder).images) == 3
+    assert len(list(folder.iterdir())) == 4
+    assert moved[-1] == "testset.json"
+
+
+def test_a_test_set_that_fails_leaves_a_folder_as_it_was(tmp_path: Path):
+    for out in (tmp_path / "new", tmp_path / "there"):
+        with pytest.raises(FsidError, match="/image/clean"), staged(out) as root:
+            write_atomically(root / "image" / "clean.dng", b"")
+        (tmp_path / "there").mkdir(exist_ok=True)
+    assert [path.name for path in tmp_path.iterdir()] == ["there"]
+    assert not list((tmp_path / "there").iterdir())

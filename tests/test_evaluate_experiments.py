@@ -15,7 +15,7 @@ import pytest
 from fsid.cli.main import main
 from fsid.cli.progress import progress_bar
 from fsid.config import read_yaml
-from fsid.evaluate.claim import claim
+from fsid.evaluate.claim import claimed
 from fsid.evaluate.compare import ImageRow
 from fsid.evaluate.dead_leaves import RADIUS_PX, dead_leaves_rand
 from fsid.evaluate.demo import DemoConfig
@@ -80,7 +80,9 @@ def test_synthetic_against_real_goes_on_where_it_was_stopped(photos: Path, tmp_p
 
 
 def test_a_demo_is_gone_on_with_by_the_same_command_alone(tmp_path: Path, capsys):
-    claim(tmp_path, DemoConfig(photographs=1), "demo")
+    with claimed(tmp_path, DemoConfig(photographs=1), "demo"), pytest.raises(SystemExit):
+        main(["demo", "-o", str(tmp_path), "--photographs", "1", "--quiet"])
+    assert "another fsid demo is at work in it" in " ".join(capsys.readouterr().err.split())
     with pytest.raises(SystemExit) as stop:
         main(["demo", "-o", str(tmp_path), "--photographs", "2", "--scenes", "3", "--quiet"])
     assert stop.value.code == 2

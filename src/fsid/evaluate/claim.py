@@ -2,22 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from fsid.config import from_plain, read_yaml, save_settings, to_plain
 from fsid.errors import FsidError
+from fsid.files import held
 
 
-def claim(out: Path, config: Any, what: str) -> None:
-    """Make `out` the folder of `config`, in `what`.yaml; FsidError where it holds another `what`."""
+@contextmanager
+def claimed(out: Path, config: Any, what: str) -> Iterator[None]:
+    """`out` is the folder of `config`, in `what`.yaml, and this process's until the end of the block.
+
+    FsidError where it holds another `what`, or where another process is at work in it.
+    """
+    with held(out, f"another fsid {what} is at work in it"):
+        _claim(out, config, what)
+        yield
+
+
+def _claim(out: Path, config: Any, what: str) -> None:
     file = out / f"{what}.yaml"
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        if not file.exists():
-            save_settings(config, file)
-    except OSError as error:
-        raise FsidError(f"{out}: cannot be written ({error.strerror})") from None
+    if not file.exists():
+        save_settings(config, file)
     there = from_plain(type(config), read_yaml(file), source=str(file))
     if there != config:
         plain, ours = to_plain(there), to_plain(config)

@@ -33,7 +33,7 @@ from fsid.dataset import (
 )
 from fsid.denoise import TrainConfig, load_history, train, train_config
 from fsid.errors import FsidError
-from fsid.evaluate.claim import claim
+from fsid.evaluate.claim import claimed
 from fsid.evaluate.compare import (
     CLASSICAL,
     NOISY,
@@ -94,9 +94,15 @@ def demo(out: Path, config: DemoConfig, bar: ProgressBar) -> Path:
         raise FsidError(
             f"--scenes {config.scenes} --seed {config.seed}: at least 1 scene, and no negative seed"
         )
-    data, run, testset = out / "data", out / "run", out / "testset"
     generated, training = GenerateConfig(width=config.width, height=config.height), _training(config)
-    claim(out, config, "demo")
+    with claimed(out, config, "demo"):
+        return _run(out, config, generated, training, bar)
+
+
+def _run(
+    out: Path, config: DemoConfig, generated: GenerateConfig, training: TrainConfig, bar: ProgressBar
+) -> Path:
+    data, run, testset = out / "data", out / "run", out / "testset"
     with bar("rendering scenes", "pairs") as progress:
         generate(data, generated, count=config.scenes, seed=config.seed, shard_size=8, progress=progress)
     with bar("training on them", "steps") as progress:

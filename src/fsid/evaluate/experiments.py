@@ -22,7 +22,7 @@ from fsid.config import Override, load_settings
 from fsid.dataset import RENDERED, GenerateConfig, check_pictures, find_photos, find_pictures, generate
 from fsid.denoise import TrainConfig, train, train_config
 from fsid.errors import FsidError
-from fsid.evaluate.claim import claim
+from fsid.evaluate.claim import claimed
 from fsid.evaluate.compare import (
     CLASSICAL,
     NOISY,
@@ -134,7 +134,11 @@ def experiment(out: Path, config: ExperimentConfig, bar: ProgressBar, *, workers
     manager that yields progress(done, total).
     """
     _check(out, config, bar, workers)
-    claim(out, config, "experiment")
+    with claimed(out, config, "experiment"):
+        return _run(out, config, bar, workers)
+
+
+def _run(out: Path, config: ExperimentConfig, bar: ProgressBar, workers: int) -> Path:
     testsets = _testsets(out, config, bar)
     rows, images = _measured(out / "baselines", [NOISY, CLASSICAL], testsets, bar)
     for source in SOURCES[config.kind]:

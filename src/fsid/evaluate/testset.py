@@ -15,7 +15,7 @@ import json
 import os
 import shutil
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -26,7 +26,7 @@ import numpy as np
 from fsid.config import from_plain, to_plain
 from fsid.dataset import find_photos, read_photo
 from fsid.errors import FsidError
-from fsid.files import write_atomically
+from fsid.files import held, write_atomically
 from fsid.sensor import (
     CameraProfile,
     Raw,
@@ -41,6 +41,7 @@ from fsid.sensor.light import LONGEST_EXPOSURE_S
 
 Progress = Callable[[int, int], None]
 
+TESTSET_FILE = "testset.json"
 _STEM = 60
 """Letters of a photograph's name in that of its folder: a file system takes 255 bytes."""
 ALL_SETS = "all"
@@ -101,7 +102,7 @@ class TestSet:
 def read_testset(root: str | Path) -> TestSet:
     """The description of the test set in `root`; FsidError where it is missing or broken."""
     root = Path(root)
-    file = root / "testset.json"
+    file = root / TESTSET_FILE
     try:
         plain = json.loads(file.read_text(encoding="utf-8"))
     except OSError as error:
@@ -222,23 +223,40 @@ def capture(
 
 def write_testset(root: Path, testset: TestSet) -> None:
     """Write testset.json."""
-    write_atomically(root / "testset.json", (json.dumps(to_plain(testset), indent=1) + "\n").encode())
+    write_atomically(root / TESTSET_FILE, (json.dumps(to_plain(testset), indent=1) + "\n").encode())
 
 
 @contextmanager
 def staged(out: Path) -> Iterator[Path]:
-    """A folder beside `out` that becomes `out` when all is written, and vanishes where something fails."""
+    """A hidden folder inside `out`; what is written there becomes the content of `out` at the end.
+
+    Nothing is left where something fails. FsidError where `out` is not empty, or another process fills it.
+    """
     if not out.name:
         raise FsidError(f"{out}: name a new folder")
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise FsidError(f"{out}: exists already and is not empty; use another folder")
-    part = out.with_name(f".{out.name}.part")
+    root, is_new = out.resolve(), not out.exists()
+    with held(root, "another fsid testset is filling it") as alone:
+        part = root / ".testset.part"
+        if any(path != part for path in root.iterdir()):
+            raise FsidError(f"{out}: exists already and is not empty; use another folder")
+        if alone:
+            shutil.rmtree(part, ignore_errors=True)  # of a run that was killed
+        _make(part)
+        try:
+            yield part
+            for path in sorted(part.iterdir(), key=lambda path: path.name == TESTSET_FILE):
+                path.rename(root / path.name)
+        except OSError as error:
+            raise FsidError(f"{out}: cannot be written ({error.strerror})") from None
+        finally:
+            shutil.rmtree(part, ignore_errors=True)
+            if is_new:
+                with suppress(OSError):  # it holds the test set
+                    root.rmdir()
+
+
+def _make(folder: Path) -> None:
     try:
-        shutil.rmtree(part, ignore_errors=True)
-        part.mkdir(parents=True)
-        yield part
-        part.replace(out)
+        folder.mkdir()
     except OSError as error:
-        raise FsidError(f"{out}: cannot be written ({error.strerror})") from None
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
+        raise FsidError(f"{folder}: cannot be made ({error.strerror})") from None
