@@ -164,6 +164,18 @@ def test_the_folder_follows_the_environment(monkeypatch):
     assert bake_cache.cache_folder("materials") is None
 
 
+def test_a_user_without_a_home_has_no_cache(monkeypatch: pytest.MonkeyPatch):
+    """As in a container whose user has no entry in passwd: no folder named ~ in the working directory."""
+
+    def no_entry(uid: int) -> None:
+        raise KeyError(uid)
+
+    for name in ("FSID_CACHE", "XDG_CACHE_HOME", "HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr("pwd.getpwuid", no_entry)
+    assert bake_cache.cache_folder("materials") is None
+
+
 def test_processes_that_bake_at_once_agree(folder):
     script = (
         "from zlib import crc32; from fsid.assets import bake_material\n"

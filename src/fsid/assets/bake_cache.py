@@ -10,7 +10,8 @@ the oldest when the folder grows beyond its limit.
 Many processes share the folder: an entry appears by atomic rename, under a name that no other process
 writes. An entry that cannot be read is baked again; a folder that cannot be written is done without.
 
-The folder is $FSID_CACHE, or $XDG_CACHE_HOME/fsid, or ~/.cache/fsid; FSID_CACHE=off keeps no files.
+The folder is $FSID_CACHE, or $XDG_CACHE_HOME/fsid, or ~/.cache/fsid; FSID_CACHE=off keeps no files, and
+neither does a user without a home.
 """
 
 from __future__ import annotations
@@ -47,14 +48,14 @@ _LEVELS = {"detail": 254}
 
 
 def cache_folder(kind: str) -> Path | None:
-    """Where entries of a kind ("materials") are kept; None where the cache is switched off."""
+    """Where entries of a kind ("materials") are kept; None where the cache is off or has no place."""
     chosen = os.environ.get("FSID_CACHE", "")
     if chosen.lower() == "off":
         return None
     if chosen:
         return Path(chosen) / kind
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    return Path(home) / "fsid" / kind
+    return None if home.startswith("~") else Path(home) / "fsid" / kind
 
 
 @cache
