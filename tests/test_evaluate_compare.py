@@ -401,3 +401,20 @@ def test_a_test_set_that_fails_leaves_a_folder_as_it_was(tmp_path: Path):
         (tmp_path / "there").mkdir(exist_ok=True)
     assert [path.name for path in tmp_path.iterdir()] == ["there"]
     assert not list((tmp_path / "there").iterdir())
+
+
+def test_a_folder_of_results_is_tried_before_the_work_and_costs_no_table(
+    small_set: Path, tmp_path: Path, monkeypatch, capsys
+):
+    out, file = tmp_path / "out", tmp_path / "file"
+    file.touch()
+    command = ["evaluate", str(small_set), "--quiet", "-o"]
+    with pytest.raises(SystemExit):
+        main([*command, str(file / "out")])
+    assert capsys.readouterr().out == ""
+    (out / "results.json").mkdir(parents=True)
+    with pytest.raises(SystemExit):
+        main([*command, str(out)])
+    told = capsys.readouterr()
+    assert "results.json: cannot be written" in told.err
+    assert "PSNR raw" in told.out

@@ -11,6 +11,7 @@ from tyro.conf import Positional, UseAppendAction
 from fsid.cli.arguments import OptionalOutput
 from fsid.cli.iso_notes import note_files
 from fsid.cli.progress import progress_bar
+from fsid.files import check_folder
 
 
 def evaluate(
@@ -31,11 +32,13 @@ def evaluate(
         output: Folder of the results.
         quiet: No progress bar.
     """
-    from fsid.evaluate.models import evaluate_models
+    from fsid.evaluate.models import evaluate_models, write_comparison
     from fsid.sensor import profile_names
 
+    if output is not None:
+        check_folder(output)
     with progress_bar("measuring", "captures", quiet=quiet) as progress:
-        comparison = evaluate_models(testset, model, output, progress=progress)
+        comparison = evaluate_models(testset, model, progress=progress)
     made = comparison.testset
     if made.camera in profile_names():  # that of a file is not there to be asked
         note_files(made.camera, made.captures(testset), quiet=quiet)
@@ -46,3 +49,5 @@ def evaluate(
             rows = [row for row in comparison.rows if (row.set, row.model) == (name, method)]
             table.add_row(method, *(f"{r.psnr_raw:.2f} / {r.psnr:.2f} / {r.ssim:.3f}" for r in rows))
         Console(markup=False).print(table)
+    if output is not None:
+        write_comparison(comparison, testset, output)

@@ -46,27 +46,24 @@ def _short_name(path: Path) -> str:
 def evaluate_models(
     testset: Path,
     models: Sequence[Path],
-    out: Path | None,
     *,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Comparison:
-    """Compare the baselines and `models`; writes results.json, images.csv, report.html into `out`."""
+    """Compare the baselines and `models`, with pictures of the middle level."""
     levels = read_testset(testset).levels
     named = zip(models, model_names(models), strict=True)
     methods = [NOISY, CLASSICAL, *(model_method(path, name) for path, name in named)]
-    if out is not None:
-        _make(out)
-    comparison = compare(testset, methods, crop_levels=levels[len(levels) // 2 :][:1], progress=progress)
-    if out is not None:
-        write_results(comparison.rows, out / "results.json")
-        write_images(comparison.images, out / "images.csv")
-        lead = f"{len(comparison.testset.images)} images, {len(levels)} levels: {comparison.testset.notes}."
-        write_report(out / "report.html", f"FSID: {testset.name}", lead, comparison_sections(comparison))
-    return comparison
+    return compare(testset, methods, crop_levels=levels[len(levels) // 2 :][:1], progress=progress)
 
 
-def _make(folder: Path) -> None:
+def write_comparison(comparison: Comparison, testset: Path, out: Path) -> None:
+    """Write results.json, images.csv and report.html of the comparison on `testset` into `out`."""
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise FsidError(f"{folder}: cannot be written ({error.strerror})") from None
+        raise FsidError(f"{out}: cannot be written ({error.strerror})") from None
+    write_results(comparison.rows, out / "results.json")
+    write_images(comparison.images, out / "images.csv")
+    made = comparison.testset
+    lead = f"{len(made.images)} images, {len(made.levels)} levels: {made.notes}."
+    write_report(out / "report.html", f"FSID: {testset.name}", lead, comparison_sections(comparison))
