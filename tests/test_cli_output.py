@@ -9,6 +9,8 @@ import sys
 import pytest
 
 from fsid.cli import main as cli
+from fsid.cli import progress
+from fsid.pace import Pace
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["generate", "--help"], ["profiles", "--help"]])
@@ -42,3 +44,41 @@ def test_a_full_disk_under_the_output_is_one_line(arguments: list[str]) -> None:
             [sys.executable, "-m", "fsid", *arguments], stdout=full, stderr=subprocess.PIPE, text=True
         )
     assert (ended.returncode, ended.stderr) == (2, "fsid: No space left on device\n")
+
+
+class Clock:
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+def test_rate_and_time_left_are_those_since_the_start() -> None:
+    """Shards of sixteen pairs come in bursts, and a run that goes on has many pairs already."""
+    clock = Clock()
+    pace = Pace(clock)
+    pace.update(1000, 1160)
+    assert (pace.rate, pace.left) == (0.0, "")
+    for clock.now, done in ((40.0, 1016), (40.1, 1032), (80.0, 1048), (80.0, 1064)):
+        pace.update(done, 1160)
+    assert pace.rate == pytest.approx(0.8)
+    lefts = []
+    for clock.now in (80.0, 110.0, 999.0):
+        lefts.append(pace.left)
+    assert lefts == ["0:02:00", "0:01:30", "0:00:00"]
+
+
+def test_without_a_terminal_a_line_a_minute_says_how_far_it_is(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    clock = Clock()
+    monkeypatch.setattr(progress, "Pace", lambda: Pace(clock))
+    told = ["pairs: 6/20 0.1 pairs/s, 0:02:20 left", "pairs: 12/20 0.1 pairs/s, 0:01:20 left"]
+    told.append("pairs: 18/20 0.1 pairs/s, 0:00:20 left")
+    for quiet in (False, True):
+        with progress.progress_bar("pairs", "pairs", quiet=quiet) as bar:
+            for clock.now in range(0, 201, 20):
+                bar(int(clock.now // 10), 20)
+        lines = [line for line in capsys.readouterr().err.splitlines() if line.startswith("pairs: ")]
+        assert lines == ([] if quiet else told)

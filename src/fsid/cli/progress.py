@@ -1,4 +1,7 @@
-"""A progress bar with rate and time left, as the `progress(done, total)` callback that the stages take."""
+"""A progress bar with rate and time left, as the `progress(done, total)` callback that the stages take.
+
+Where there is no terminal, as in a batch job, a line a minute stands for the bar.
+"""
 
 from __future__ import annotations
 
@@ -6,38 +9,39 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    ProgressColumn,
-    Task,
-    TaskID,
-    TextColumn,
-    TimeRemainingColumn,
-)
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TaskID, TextColumn
 from rich.text import Text
 
+from fsid.pace import Pace
 
-class _Rate(ProgressColumn):
-    def __init__(self, unit: str) -> None:
+
+class _Speed(ProgressColumn):
+    def __init__(self, pace: Pace, unit: str) -> None:
         super().__init__()
-        self._unit = unit
+        self._pace, self._unit = pace, unit
 
     def render(self, task: Task) -> Text:
-        speed = task.finished_speed or task.speed
-        return Text(f"{speed:.2f} {self._unit}/s" if speed else "", style="dim")
+        return Text(_speed(self._pace, self._unit), style="dim")
+
+
+def _speed(pace: Pace, unit: str) -> str:
+    return f"{pace.rate:.3g} {unit}/s, {pace.left} left" if pace.left else ""
 
 
 class Bar:
     """`bar(done, total)` moves it, and shows it at the first call; `bar.failed(line)` counts a failure."""
 
-    def __init__(self, bar: Progress, task: TaskID) -> None:
-        self._bar, self._task, self._failures = bar, task, 0
+    def __init__(self, bar: Progress, task: TaskID, unit: str, pace: Pace) -> None:
+        self._bar, self._task, self._unit, self._pace, self._failures = bar, task, unit, pace, 0
 
     def __call__(self, done: int, total: int) -> None:
+        self._pace.update(done, total)
         self._bar.start()
         self._bar.update(self._task, completed=done, total=total)
+        if not self._bar.console.is_terminal and self._pace.line_due():
+            label = self._bar.tasks[self._task].description
+            line = f"{label}: {done}/{total} {_speed(self._pace, self._unit)}"
+            self._bar.console.print(Text(line), soft_wrap=True)
 
     def failed(self, line: str) -> None:
         """Something failed that will be tried again."""
@@ -49,17 +53,17 @@ class Bar:
 @contextmanager
 def progress_bar(label: str, unit: str, *, quiet: bool) -> Iterator[Bar]:
     """Yields progress(done, total), both in `unit`s, for a `with` block; the bar appears at the first."""
+    pace = Pace()
     columns = (
         TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
-        _Rate(unit),
-        TimeRemainingColumn(),
+        _Speed(pace, unit),
         TextColumn("[yellow]{task.fields[failures]}"),
     )
     bar = Progress(*columns, console=Console(stderr=True, quiet=quiet))
     task = bar.add_task(label, total=None, failures="")
     try:
-        yield Bar(bar, task)
+        yield Bar(bar, task, unit, pace)
     finally:
         bar.stop()

@@ -1,12 +1,17 @@
-"""The one line that a training shows: step, loss, PSNR, patches per second, time left."""
+"""The one line that a training shows: step, loss, PSNR, patches per second, time left.
+
+Where there is no terminal, as in a batch job, it is a line a minute.
+"""
 
 from __future__ import annotations
 
 from types import TracebackType
 
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from fsid.denoise.train_config import TrainConfig
+from fsid.pace import Pace
 
 _SMOOTHING = 0.05  # of the shown loss and PSNR, which jump from batch to batch
 
@@ -22,12 +27,13 @@ class LiveLine:
             TextColumn("{task.fields[figures]}"),
             TextColumn("{task.fields[held_out]}"),
             TextColumn("{task.fields[rate]}"),
-            TimeRemainingColumn(),
         )
-        self._progress = Progress(*columns, disable=quiet)
+        self._progress = Progress(*columns, console=Console(stderr=True, quiet=quiet), disable=quiet)
         self._task = self._progress.add_task(
             "train", total=config.steps, completed=step, figures="", rate="", held_out=""
         )
+        self._pace, self._steps = Pace(), config.steps
+        self._pace.update(step, config.steps)
         self._batch = config.batch * processes
         self._shown: tuple[float, float] | None = None
 
@@ -45,10 +51,12 @@ class LiveLine:
         old_loss, old_psnr = self._shown or (loss, psnr)
         loss, psnr = old_loss + _SMOOTHING * (loss - old_loss), old_psnr + _SMOOTHING * (psnr - old_psnr)
         self._shown = loss, psnr
-        speed = self._progress.tasks[0].speed
-        rate = f"{speed * self._batch:.0f} patches/s" if speed else ""
+        self._pace.update(step, self._steps)
+        rate = f"{self._pace.rate * self._batch:.0f} patches/s, {self._pace.left} left"
         figures = f"loss {loss:.3f}  PSNR {psnr:.2f} dB"
         self._progress.update(self._task, completed=step, figures=figures, rate=rate)
+        if not self._progress.console.is_terminal and self._pace.line_due():
+            self._progress.console.print(f"train: {step}/{self._steps}  {figures}  {rate}", soft_wrap=True)
 
     def validated(self, psnr: float) -> None:
         """PSNR in dB on the held-out scenes."""
