@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import shlex
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -44,6 +46,24 @@ def test_a_full_disk_under_the_output_is_one_line(arguments: list[str]) -> None:
             [sys.executable, "-m", "fsid", *arguments], stdout=full, stderr=subprocess.PIPE, text=True
         )
     assert (ended.returncode, ended.stderr) == (2, "fsid: No space left on device\n")
+
+
+def test_a_closed_output_does_not_fail_a_command() -> None:
+    """As `fsid ... >&-`, or a job without one."""
+    command = f"{shlex.quote(sys.executable)} -m fsid profiles >&-"
+    ended = subprocess.run(["sh", "-c", command], stderr=subprocess.PIPE, text=True)
+    assert (ended.returncode, ended.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "utf-8"])
+def test_a_name_that_is_no_text_fails_no_command(photos: Path, tmp_path: Path, encoding: str) -> None:
+    out = os.path.join(os.fsencode(tmp_path), "trü".encode("latin-1"))
+    command = [sys.executable, "-m", "fsid", "generate", out, "--count", "1", "--images", str(photos)]
+    environment = {**os.environ, "PYTHONIOENCODING": encoding}
+    small = ["--width", "32", "--height", "32"]
+    for last in (["--dry-run"], []):
+        subprocess.run([*command, *small, *last], check=True, capture_output=True, env=environment)
+    assert r"tr\udcfc" in Path(os.fsdecode(out), "README.md").read_text(encoding="utf-8")
 
 
 class Clock:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import io
 import os
 import select
 import signal
@@ -77,12 +78,16 @@ class _Terminated(KeyboardInterrupt):
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run one command, in the main thread; exit code 0 when done, 2 for bad input or a full disk, 130 after
     Ctrl-C, 143 after SIGTERM, 141 when nobody reads on."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # a file's name may be no text in its encoding
+            stream.reconfigure(errors="backslashreplace")
     before = signal.signal(signal.SIGTERM, _terminate)
     try:
         try:
             _run(arguments)
         finally:
-            sys.stdout.flush()
+            if sys.stdout is not None:
+                sys.stdout.flush()
     except OSError as error:
         is_closed = isinstance(error, BrokenPipeError) and not _is_read(sys.stdout)
         if not is_closed and error.errno not in FULL:

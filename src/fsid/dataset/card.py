@@ -77,7 +77,8 @@ def write_card(out: Path, dataset: DatasetConfig, shards: Sequence[Path], comman
         for record in read_records(shard):
             tally.add(record)
     write_atomically(out / SHEET, _sheet(shards))
-    write_atomically(out / CARD, _text(dataset, tally, list(_statistics(out)), command).encode())
+    text = _text(dataset, tally, list(_statistics(out)), command)
+    write_atomically(out / CARD, text.encode(errors="backslashreplace"))
 
 
 def _text(dataset: DatasetConfig, tally: _Tally, statistics: Sequence[str], command: str) -> str:

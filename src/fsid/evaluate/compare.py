@@ -197,7 +197,7 @@ def write_images(images: Sequence[ImageRow], file: Path) -> None:
     writer.writerow(field.name for field in fields(ImageRow))
     for row in images:
         writer.writerow(f"{v:.4f}" if isinstance(v, float) else v for v in astuple(row))
-    write_atomically(file, text.getvalue().encode())
+    write_atomically(file, text.getvalue().encode(errors="backslashreplace"))
 
 
 def confidence(values: Sequence[float]) -> float:

@@ -71,7 +71,7 @@ def write_report(file: Path, title: str, lead: str, sections: Sequence[Section])
     template = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     source = files("fsid.evaluate").joinpath("report.html.j2").read_text(encoding="utf-8")
     page = template.from_string(source).render(title=title, lead=lead, sections=sections, version=__version__)
-    write_atomically(file, page.encode())
+    write_atomically(file, page.encode(errors="backslashreplace"))
 
 
 def picture(srgb: np.ndarray, caption: str = "", *, pixelated: bool = False) -> Picture:
