@@ -208,6 +208,35 @@ def test_equal_images_leave_valid_json(tmp_path: Path):
     assert np.isnan(confidence([float("inf"), 40.0]))
 
 
+def test_pictures_of_one_set_are_no_independent_draws():
+    """Three pictures each of ten materials: 95 % of intervals hold the truth; of 30 draws 74 % would."""
+    rng = np.random.default_rng(0)
+    sets = [f"material{i // 3}" for i in range(30)]
+    between, within = rng.normal(0, 4, (2000, 10, 1)), rng.normal(0, 1, (2000, 10, 3))
+    runs = (30 + between + within).reshape(2000, 30)
+    held = [abs(run.mean() - 30) <= confidence(run, sets) for run in runs]
+    assert np.mean(held) == pytest.approx(0.95, abs=0.015)
+    means = runs[0].reshape(10, 3).mean(axis=1)
+    assert confidence(runs[0], sets) == pytest.approx(confidence(means))
+    assert confidence(runs[0], ["one"] * 30) == confidence(runs[0])
+    assert confidence([39.0, 41.0, 43.0]) == pytest.approx(4.303 * 2 / np.sqrt(3), rel=1e-3)
+
+
+def test_the_report_says_what_its_intervals_count(small_set: Path, tmp_path: Path):
+    assert "confidence interval; bold" in comparison_sections(compare(small_set, [NOISY]))[0].text
+    shutil.copytree(small_set, tmp_path / "set")
+    testset = read_testset(small_set)
+    named = [dataclasses.replace(image, set=f"s{i // 2}") for i, image in enumerate(testset.images)]
+    plain = dataclasses.asdict(dataclasses.replace(testset, images=tuple(named)))
+    (tmp_path / "set" / "testset.json").write_text(json.dumps(plain))
+    comparison = compare(tmp_path / "set", [NOISY])
+    figures = comparison_sections(comparison)[0]
+    assert "confidence interval over the 2 sets" in figures.text
+    values = [image.psnr_raw for image in comparison.images if image.level == "iso800"]
+    half = confidence(values, [image.set for image in comparison.images if image.level == "iso800"])
+    assert figures.tables[0].rows[0][1].endswith(f" ± {half:.2f}")
+
+
 def test_an_image_with_nan_is_not_perfect():
     image = np.full((16, 16), 0.5, np.float32)
     assert np.isnan(psnr(np.full_like(image, np.nan), image))

@@ -200,14 +200,21 @@ def write_images(images: Sequence[ImageRow], file: Path) -> None:
     write_atomically(file, text.getvalue().encode(errors="backslashreplace"))
 
 
-def confidence(values: Sequence[float]) -> float:
+def confidence(values: Sequence[float], sets: Sequence[str] = ()) -> float:
     """Half width of the 95 % confidence interval of the mean (Student's t).
 
-    NaN of fewer than two values, or where one is infinite.
+    sets: that of each value. Where there are several, these are what is counted, since pictures of one
+    material or photographer are alike (clustered variance; of sets of equal size, the interval over their
+    means). NaN of fewer than two values, or where one is infinite.
     """
     if len(values) < 2 or not np.isfinite(values).all():
         return float("nan")
-    return float(stdtrit(len(values) - 1, 0.975) * np.std(values, ddof=1) / np.sqrt(len(values)))
+    named, cluster = np.unique(sets, return_inverse=True)
+    if len(named) < 2:
+        cluster = np.arange(len(values))
+    departure = np.bincount(cluster, np.asarray(values) - np.mean(values))
+    n = len(departure)
+    return float(stdtrit(n - 1, 0.975) * np.sqrt(n / (n - 1) * np.sum(departure**2)) / len(values))
 
 
 def summarise(testset: TestSet, methods: Sequence[Method], images: Sequence[ImageRow]) -> list[Row]:

@@ -30,9 +30,10 @@ def comparison_sections(comparison: Comparison) -> list[Section]:
     """The tables, the plots over levels, and the crops side by side."""
     *single, whole = dict.fromkeys(row.set for row in comparison.rows)
     images = next(row.n for row in comparison.rows if row.set == whole)
+    counted = f" over the {len(single)} sets, since images of a set are alike" if single else ""
     text = (
         f"{'All sets together' if single else whole}: means over {images} images, ± half the width of the "
-        "95 % confidence interval; bold is best."
+        f"95 % confidence interval{counted}; bold is best."
     )
     tables = tuple(_metric_table(comparison, whole, *metric) for metric in METRICS)
     sections = [
@@ -66,19 +67,20 @@ def _metric_table(comparison: Comparison, set_name: str, key: str, title: str, f
     means = np.hstack([means, means.mean(1, keepdims=True)])
     body = []
     for method, values in zip(methods, means, strict=True):
-        halves = [confidence(_of_images(comparison, rows[method, level], key)) for level in levels]
+        halves = [_half_width(comparison, rows[method, level], key) for level in levels]
         cells = [_with_interval(f"{v:{form}}", h, form) for v, h in zip(values[:-1], halves, strict=True)]
         body.append((method_label(method), *cells, f"{values[-1]:{form}}"))
     best = {(int(i), int(j) + 1) for i, j in zip(*np.nonzero(means == means.max(0)), strict=True)}
     return Table(title, ("", *map(level_label, levels), "mean"), tuple(body), frozenset(best))
 
 
-def _of_images(comparison: Comparison, row: Row, key: str) -> list[float]:
-    return [
-        getattr(image, key)
+def _half_width(comparison: Comparison, row: Row, key: str) -> float:
+    images = [
+        image
         for image in comparison.images
         if (image.model, image.level) == (row.model, row.level) and row.set in (image.set, ALL_SETS)
     ]
+    return confidence([getattr(image, key) for image in images], [image.set for image in images])
 
 
 def _with_interval(value: str, half: float, form: str) -> str:
