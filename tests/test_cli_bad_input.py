@@ -40,6 +40,7 @@ def folder(tmp_path: Path) -> Path:
     (tmp_path / "loop.dng").symlink_to(tmp_path / "loop.dng")
     np.save(tmp_path / "nan.npy", np.full((64, 64), np.nan, np.float32))
     Image.new("L", (64, 64)).save(tmp_path / "gray8.png")
+    Image.new("I;16", (64, 64)).save(tmp_path / "gray16.tif")  # LibRaw takes it for a RAW
     return tmp_path
 
 
@@ -109,7 +110,10 @@ CASES = [
     ("profiles {0}/text.yaml", "text.yaml"),
     ("develop {0}/none.dng {0}/out.png", "none.dng"),
     ("develop {0}/text.dng {0}/out.png", "text.dng"),
-    ("develop {0}/zeros.raw {0}/out.png", "zeros.raw: has no header"),
+    *(
+        (f"develop {{0}}/{name} {{0}}/out.png", f"{name}: is a bare mosaic: write it as DNG first, see docs/")
+        for name in ("zeros.raw", "nan.npy", "gray8.png", "gray16.tif")
+    ),
     ("train {0}/none -o {0}/out", "none"),
     ("train {0}/empty -o {0}/out", "empty"),
     ("train {0}/empty -o {0}/out --set no_such_key=1", "no_such_key"),

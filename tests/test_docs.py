@@ -137,6 +137,22 @@ def test_the_python_of_the_calibration_guide_runs(desk: Path, monkeypatch: pytes
     np.testing.assert_allclose(profile.k[1], true.level(3200).k, rtol=0.1)
 
 
+def test_the_python_for_bare_mosaics_makes_captures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    write_captures(tmp_path / "taken")
+    for path in sorted(Path("taken").glob("*/*/*.dng")):
+        target = ("mosaics" / path.relative_to("taken")).with_suffix(".npy")
+        target.parent.mkdir(parents=True, exist_ok=True)
+        np.save(target, to_dn(read_raw(path)))
+    text = (REPOSITORY / "docs" / "capture-a-test-set.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"```python\n(.*?)```", text, re.S)
+    exec(compile(block, "capture-a-test-set.md", "exec"), {})
+    main(["testset", "from-bursts", "captures", "-o", "set", "--camera", "pixel6", "--quiet"])
+    first = read_raw("set/star/0.5lux.noisy.dng")
+    np.testing.assert_array_equal(to_dn(first), np.load("mosaics/star/0.5lux/0000.npy"))
+    assert (first.iso, first.cfa) == (3200, "RGGB")
+
+
 def test_the_readme_names_every_command_and_no_other():
     text = (REPOSITORY / "README.md").read_text(encoding="utf-8")
     named = set(re.findall(r"^\| `fsid ([a-z]+)", text, re.M))

@@ -21,7 +21,7 @@ import rawpy
 from fsid.errors import FsidError
 from fsid.files import write_atomically
 from fsid.sensor import dng_tags
-from fsid.sensor.bare import HEADERLESS_SUFFIXES
+from fsid.sensor.bare import BARE_SUFFIXES
 from fsid.sensor.black_levels import BlackLevels
 from fsid.sensor.colour import published_matrices
 from fsid.sensor.embedded import embedded_directories
@@ -197,18 +197,21 @@ def _mosaic_directory(directories: list[dict[int, Tag]]) -> dict[int, Tag]:
 def _read_source(path: Path) -> _Source:
     with path.open("rb") as file:
         directories = read_directories(file) or embedded_directories(file)
-        if not directories and path.suffix.lower() in HEADERLESS_SUFFIXES:  # LibRaw guesses by the length
-            raise FsidError(f"{path}: has no header that says what it holds; it is a bare mosaic")
         mosaic = _mosaic_directory(directories)
+        values: dict[int, Values] = {}
+        for directory in (*directories, mosaic):
+            values |= {code: tag.values for code, tag in directory.items()}
+        described = mosaic or dng_tags.camera_name(values) != "unknown"
+        if path.suffix.lower() in BARE_SUFFIXES and not described:  # LibRaw guesses
+            raise FsidError(
+                f"{path}: is a bare mosaic: write it as DNG first, see docs/capture-a-test-set.md"
+            )
         check_intact(file, mosaic, path)
     if SAMPLE_FORMAT in mosaic and mosaic[SAMPLE_FORMAT].values == (_FLOATING_POINT,):
         raise FsidError(
             f"{path}: holds floating-point pixels, which LibRaw scales by a factor that it does not tell; "
             f"FSID needs the integers of a camera"
         )
-    values: dict[int, Values] = {}
-    for directory in (*directories, mosaic):
-        values |= {code: tag.values for code, tag in directory.items()}
     return _Source(values, kept_metadata(directories, mosaic) if directories else None)
 
 
