@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shlex
 import shutil
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 
 from fsid.cli.main import COMMANDS, main
+from fsid.evaluate import read_testset
 from fsid.sensor import Raw, load_profile, noisy_from_clean, read_raw, to_dn, write_dng
 
 REPOSITORY = Path(__file__).resolve().parents[1]
@@ -135,6 +137,22 @@ def test_the_python_of_the_calibration_guide_runs(desk: Path, monkeypatch: pytes
     profile, true = load_profile(desk / "arrays.yaml"), load_profile("galaxy-s22")
     assert profile.iso == (800, 3200)
     np.testing.assert_allclose(profile.k[1], true.level(3200).k, rtol=0.1)
+
+
+def test_the_python_of_the_guide_to_measuring_runs(desk: Path, monkeypatch: pytest.MonkeyPatch):
+    """Another program's images are found by name: here they are the truths. Runs after the guides."""
+    monkeypatch.chdir(desk)
+    testset = read_testset("testset")
+    for image, level in product(testset.images, testset.levels):
+        target = "theirs" / testset.noisy(Path(), image, level)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        write_dng(target, read_raw(testset.clean(Path("testset"), image, level)))
+    text = (REPOSITORY / "docs" / "evaluate.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"```python\n(.*?)```", text, re.S)
+    exec(compile(block, "evaluate.md", "exec"), {})
+    rows = json.loads((desk / "compared.json").read_text())
+    assert {row["model"] for row in rows} == {"noisy", "classical", "mine", "theirs"}
+    assert all(row["psnr_raw"] is None or row["psnr_raw"] > 90 for row in rows if row["model"] == "theirs")
 
 
 def test_the_python_for_bare_mosaics_makes_captures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
