@@ -8,6 +8,7 @@ import json
 import shutil
 import subprocess
 import sys
+import tarfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -73,6 +74,18 @@ def test_a_lost_shard_comes_back_byte_for_byte(scenes: Path):
     assert generate(scenes, small(), count=4, seed=7, shard_size=2) == 2
     assert [shard.read_bytes() for shard in sorted(scenes.glob("shard-*.tar"))] == before
     assert generate(scenes, small(), count=4, seed=7, shard_size=2) == 0
+
+
+def test_a_shard_that_was_cut_between_two_files_is_made_again(scenes: Path, tmp_path: Path):
+    """By a copy that was stopped: a tar without its end is read like one with it."""
+    out, path = tmp_path / "out", shard_path(tmp_path / "out", 1)
+    shutil.copytree(scenes, out)
+    whole = path.read_bytes()
+    with tarfile.open(path) as tar:
+        (end,) = (member.offset for member in tar if member.name == "00000003.json")
+    path.write_bytes(whole[:end])
+    assert generate(out, small(), count=4, seed=7, shard_size=2) == 2
+    assert path.read_bytes() == whole
 
 
 def test_another_seed_gives_other_pictures(scenes: Path, tmp_path: Path):

@@ -21,7 +21,7 @@ from fsid.dataset.crew import Crew, LocalCrew, run
 from fsid.dataset.pictures import find_pictures, pictures_digest
 from fsid.dataset.sample import encode, make_frame
 from fsid.dataset.settle import Settle, settle
-from fsid.dataset.shards import remove_parts, shard_keys, shard_path, write_shard
+from fsid.dataset.shards import count_whole, remove_parts, shard_path, write_shard
 from fsid.dataset.tasks import check_cameras, check_task
 from fsid.dataset.worker import Worker
 from fsid.errors import FsidError
@@ -241,5 +241,5 @@ def _missing(out: Path, dataset: DatasetConfig, count: int) -> Iterator[_Shard]:
     for number, start in enumerate(range(0, count, size)):
         indices = range(start, min(start + size, count))
         path = shard_path(out, number)
-        if not path.exists() or len(shard_keys(path)) < len(indices):
+        if not path.exists() or count_whole(path) < len(indices):
             yield _Shard(path, indices, dataset)

@@ -84,6 +84,11 @@ def shard_keys(path: str | Path) -> list[str]:
     return list(dict.fromkeys(name.partition(".")[0] for name in _members(path)))
 
 
+def count_whole(path: str | Path) -> int:
+    """How many samples of a shard are whole: have their JSON, which is written last."""
+    return sum(name.endswith(".json") for name in _members(path))
+
+
 def read_member(path: str | Path, name: str) -> bytes:
     """One file of a shard, for example `00000000.json`."""
     try:
