@@ -266,6 +266,17 @@ def test_loading_processes_change_nothing(processes: int, dataset: Path) -> None
     assert not processes or len(places) == 2 * processes + 1
 
 
+def test_too_little_shared_memory_is_one_line(dataset: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As a container has, whose /dev/shm is of 64 MB."""
+
+    def full(tensor: torch.Tensor) -> None:
+        raise RuntimeError("unable to allocate shared memory(shm) for file </torch_1>: No space left (28)")
+
+    monkeypatch.setattr(torch.Tensor, "share_memory_", full)
+    with pytest.raises(FsidError, match=r"loader_processes: these need \d+ MB .*--shm-size"):
+        next(batches(PatchDataset(dataset, CONFIG, seed=3), range(2), 1))
+
+
 def test_the_loop_of_the_guide_runs(dataset: Path, monkeypatch, capsys) -> None:
     guide = Path(__file__).resolve().parents[1] / "docs" / "generate.md"
     (block,) = re.findall(r"```python\n(from torch.*?)```", guide.read_text(encoding="utf-8"), re.S)

@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from torch.utils.data import DataLoader, Dataset
 
 from fsid.dataset.loader import Batch, PatchDataset
+from fsid.errors import FsidError
 
 _AHEAD = 2  # batches that each process is asked for beyond the one in use
 
@@ -24,11 +25,12 @@ def batches(patches: PatchDataset, steps: range, processes: int = 0, *, pin: boo
     A batch of other processes is valid until the next one is asked for: clone the tensors that are to be
     kept. (Clones of all of them cost an eighth of the patches per second, and training keeps none.)
     pin: into page-locked memory of its own, from which a GPU copies faster; it stays valid.
+    FsidError where shared memory has no room for them.
     """
     if not processes:
         made = (patches[step] for step in steps)
     else:
-        ring = [_shared(patches.empty_batch()) for _ in range(_AHEAD * processes + 1)]
+        ring = _shared([patches.empty_batch() for _ in range(_AHEAD * processes + 1)])
         slots = DataLoader(
             _Slots(patches, steps, ring), batch_size=None, num_workers=processes, prefetch_factor=_AHEAD
         )
@@ -52,5 +54,14 @@ class _Slots(Dataset[int]):
         return slot
 
 
-def _shared(batch: Batch) -> Batch:
-    return Batch(*(tensor.share_memory_() for tensor in batch.tensors))
+def _shared(ring: list[Batch]) -> list[Batch]:
+    try:
+        return [Batch(*(tensor.share_memory_() for tensor in batch.tensors)) for batch in ring]
+    except RuntimeError as error:
+        if "shared memory" not in str(error):
+            raise
+    size_mb = sum(tensor.nbytes for batch in ring for tensor in batch.tensors) / 1e6
+    raise FsidError(
+        f"loader_processes: these need {size_mb:.0f} MB of shared memory (/dev/shm), which has less room; "
+        "give it more (docker run --shm-size), or take fewer of them: 0 needs none"
+    )
