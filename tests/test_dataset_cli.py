@@ -217,7 +217,22 @@ def test_a_dry_run_estimates_and_writes_nothing(data: Path, capsys: pytest.Captu
     per_pair_mb = [float(mb) for mb in re.findall(r"([\d.e+-]+) MB per pair", text)]
     assert re.search(r"time   0 h \d\d min with 2 workers \([\d.e-]+ s per pair\)", text)
     stored_mb = shard_path(data / "data", 0).stat().st_size / 5e6
-    assert per_pair_mb == pytest.approx([stored_mb] * 2, rel=0.2)
+    assert per_pair_mb == pytest.approx([stored_mb], rel=0.2)
+    assert "all 5 pairs are there" in text
+
+
+def test_a_dry_run_is_of_what_the_run_would_do(data: Path, tmp_path: Path, capsys) -> None:
+    for name in ("shard-00000.tar", "config.yaml"):
+        shutil.copy(data / "data" / name, tmp_path / name)
+    samples = read_samples(tmp_path / "shard-00000.tar")
+    whole = [(f"{index:08d}", samples["00000000"]) for index in range(16)]
+    write_shard(tmp_path / "shard-00000.tar", whole)
+    command = [words(data)[0], str(tmp_path), *words(data)[2:], "--count", "20", "--dry-run"]
+    main(command)
+    assert "4 pairs in 1 shards; 16 more are there" in capsys.readouterr().out
+    with pytest.raises(SystemExit):
+        main(["5" if word == "4" else word for word in command])  # its seed
+    assert "already holds another dataset" in " ".join(capsys.readouterr().err.split())
 
 
 def test_progress_shows_rate_time_left_and_failures(capsys: pytest.CaptureFixture[str]) -> None:

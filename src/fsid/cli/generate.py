@@ -20,7 +20,7 @@ from fsid.errors import FsidError
 
 if TYPE_CHECKING:
     from fsid.config import Override
-    from fsid.dataset import GenerateConfig, Workforce
+    from fsid.dataset import DatasetConfig, GenerateConfig, Workforce
 
 Variant = Literal["objects", "materials", "objects-materials", "full"]
 Task = Literal["denoise", "super-resolution", "deblur", "burst"]
@@ -117,7 +117,7 @@ def generate(
     if not settings.images:
         read_mesh_folders(settings.scene, quiet=quiet)
     if dry_run:
-        Console().print(_plan(out, settings, count, seed, workforce), soft_wrap=True)
+        Console().print(_plan(out, settings, dataset, count, workforce), soft_wrap=True)
     else:
         if not is_begun(out, dataset):
             _check_sources(settings, count, workforce, quiet=quiet)
@@ -158,16 +158,22 @@ def _make(
         )
 
 
-def _plan(out: Path, settings: GenerateConfig, count: int, seed: int, workforce: Workforce) -> str:
-    """What a dry run says: time, size and number of shards, from a few pairs."""
-    from fsid.dataset import estimate
+def _plan(
+    out: Path, settings: GenerateConfig, dataset: DatasetConfig, count: int, workforce: Workforce
+) -> str:
+    """What a dry run says: time, size and number of shards of what `out` lacks, from a few pairs."""
+    from fsid.dataset import estimate, pairs_to_make
 
-    costs = estimate(settings, count=count, seed=seed, workforce=workforce)
+    left = pairs_to_make(out, dataset, count)
+    if not left:
+        return f"{out}: all {count} pairs are there; nothing was written."
+    costs = estimate(settings, count=left, seed=dataset.seed, workforce=workforce)
     hours, minutes = divmod(round(costs.seconds / 60), 60)
     folder = next(path for path in (out, *out.absolute().parents) if path.exists())
+    there = f"; {count - left} more are there" if left < count else ""
     free = shutil.disk_usage(folder).free
     return (
-        f"{out}: {costs.pairs} pairs in {costs.shards} shards\n"
+        f"{out}: {costs.pairs} pairs in {costs.shards} shards{there}\n"
         f"time   {hours} h {minutes:02d} min with {workforce.workers} workers "
         f"({costs.seconds / costs.pairs:.3g} s per pair)\n"
         f"size   {costs.bytes / 1e9:.3g} GB ({costs.bytes / costs.pairs / 1e6:.3g} MB per pair), "

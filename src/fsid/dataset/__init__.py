@@ -3,7 +3,7 @@
 from fsid.dataset.attempt import Sample, sample_key
 from fsid.dataset.config import RENDERED, DatasetConfig, GenerateConfig, generate_config
 from fsid.dataset.estimate import Estimate, estimate
-from fsid.dataset.generate import Workforce, dataset_config, generate, is_begun
+from fsid.dataset.generate import Workforce, dataset_config, generate, is_begun, pairs_to_make
 from fsid.dataset.given import check_given
 from fsid.dataset.only import make_only
 from fsid.dataset.photos import find_photos, read_photo
@@ -36,6 +36,7 @@ __all__ = [
     "make_frame",
     "make_only",
     "make_sample",
+    "pairs_to_make",
     "read_member",
     "read_photo",
     "remake",

@@ -135,6 +135,12 @@ def generate(
     return total
 
 
+def pairs_to_make(out: Path, dataset: DatasetConfig, count: int) -> int:
+    """How many of the first `count` pairs `out` lacks, in whole shards; FsidError where it holds others."""
+    is_begun(out, dataset)
+    return sum(len(shard.indices) for shard in _missing(out, dataset, count))
+
+
 def dataset_config(config: GenerateConfig, seed: int, shard_size: int = 0) -> DatasetConfig:
     """The identity of the dataset of (config, seed); FsidError where what it names does not exist."""
     config = as_read(config, source="config")
