@@ -27,8 +27,8 @@ bench: $(TEST_READY)
 setup: $(READY)
 
 $(READY): pyproject.toml constraints.txt tools/system-libraries.sh
-	tools/system-libraries.sh
-	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "FSID needs Python 3.11 or newer: make PYTHON=python3.11 ...")'
+	! command -v $(PYTHON) >/dev/null || $(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "FSID needs Python 3.11 or newer: make PYTHON=python3.11 ...")'
+	PYTHON=$(PYTHON) tools/system-libraries.sh
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[train]'
 	touch $(READY)

@@ -1,6 +1,7 @@
 #!/bin/sh
 # Headless OpenGL needs libEGL, libGL and a Mesa driver. Installs what is missing (Debian, Ubuntu) when root,
-# else prints the one line to run. A vendor's EGL driver, where present, is preferred at run time.
+# else prints the one line to run. PYTHON names the interpreter that is to be used (python3). A vendor's EGL
+# driver, where present, is preferred at run time.
 set -eu
 PATH="$PATH:/usr/sbin:/sbin" # where ldconfig is, for users too
 
@@ -10,7 +11,9 @@ have libEGL.so.1 || packages="$packages libegl1"
 have libGL.so.1 || packages="$packages libgl1"
 find /usr/lib /usr/lib64 -name 'swrast_dri.so' -o -name 'libgallium*.so' 2>/dev/null | grep -q . ||
     packages="$packages libegl-mesa0 libgl1-mesa-dri"
-python3 -c 'import ensurepip' 2>/dev/null || packages="$packages python3-venv"
+python="${PYTHON:-python3}"
+"$python" -c 'import ensurepip' 2>/dev/null ||
+    packages="$packages $("$python" -c 'import sys; print("python3.%d-venv" % sys.version_info[1])' || echo python3-venv)"
 [ -n "$packages" ] || exit 0
 
 if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
