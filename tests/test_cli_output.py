@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shlex
 import subprocess
@@ -64,6 +65,18 @@ def test_a_name_that_is_no_text_fails_no_command(photos: Path, tmp_path: Path, e
     for last in (["--dry-run"], []):
         subprocess.run([*command, *small, *last], check=True, capture_output=True, env=environment)
     assert r"tr\udcfc" in Path(os.fsdecode(out), "README.md").read_text(encoding="utf-8")
+
+
+def test_a_file_that_is_named_in_bytes_is_named_in_letters(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def refused() -> None:
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS), b"run/events")
+
+    monkeypatch.setitem(cli.COMMANDS, "profiles", refused)
+    with pytest.raises(SystemExit):
+        cli.main(["profiles"])
+    assert capsys.readouterr().err == "fsid: run/events: Read-only file system\n"
 
 
 class Clock:

@@ -37,6 +37,7 @@ from fsid.denoise import (  # noqa: E402
     load_history,
     train,
 )
+from fsid.denoise.board import Board  # noqa: E402
 from fsid.denoise.checkpoint import load_checkpoint  # noqa: E402
 from fsid.denoise.raw_denoiser import RawDenoiser  # noqa: E402
 from fsid.denoise.stabilise import stabilise, unstabilise  # noqa: E402
@@ -371,6 +372,22 @@ def test_a_folder_is_one_training_s_at_a_time(data: Path, tmp_path: Path) -> Non
     assert not (run / "checkpoint.safetensors").exists()
     train(data, run, one, quiet=True)
     assert (run / "checkpoint.safetensors").exists()
+
+
+def test_a_folder_that_cannot_be_written_is_one_line_before_the_work(
+    data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("fsid.files.os.access", lambda *_: False)
+    with pytest.raises(FsidError, match="run: cannot be written"):
+        train(data, tmp_path / "run", replace(CONFIG, steps=1), quiet=True)
+    assert not (tmp_path / "run").exists()
+
+
+def test_logs_that_cannot_be_written_are_one_line(tmp_path: Path) -> None:
+    pytest.importorskip("tensorboard")
+    (tmp_path / "tensorboard").touch()
+    with pytest.raises(FsidError, match=r"tensorboard: cannot be written .*tensorboard=false does without"):
+        Board(tmp_path, 0, wanted=True)
 
 
 def test_the_corrected_command_goes_into_the_folder_of_the_one_that_failed(

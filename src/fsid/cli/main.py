@@ -128,7 +128,7 @@ def _run(arguments: Sequence[str] | None) -> None:
     except OSError as error:
         if error.filename is None:
             raise
-        _fail(f"{error.filename}: {error.strerror}")
+        _fail(f"{os.fsdecode(error.filename)}: {error.strerror}")
     except RuntimeError as error:
         if not str(error).startswith(SYMLINK_LOOP):
             raise

@@ -9,6 +9,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from fsid.errors import FsidError
+
 BOARD_FOLDER = "tensorboard"
 
 
@@ -22,7 +24,13 @@ class Board:
                 from torch.utils.tensorboard import SummaryWriter
             except ImportError:
                 return
-            self._writer = SummaryWriter(str(run_dir / BOARD_FOLDER), purge_step=step or None)
+            try:
+                self._writer = SummaryWriter(str(run_dir / BOARD_FOLDER), purge_step=step or None)
+            except OSError as error:
+                raise FsidError(
+                    f"{run_dir / BOARD_FOLDER}: cannot be written ({error.strerror}); "
+                    "tensorboard=false does without"
+                ) from None
 
     def write(self, step: int, figures: Mapping[str, float]) -> None:
         """One point per figure at `step`."""

@@ -44,7 +44,7 @@ from fsid.denoise.stabilise import stabilise
 from fsid.denoise.train_config import TrainConfig
 from fsid.denoise.validate import held_out, validation
 from fsid.errors import FsidError
-from fsid.files import held, write_atomically
+from fsid.files import check_folder, held, write_atomically
 
 HISTORY_FILE, VALIDATION_FILE = "history.json", "validation.json"
 LAST_FILE = "last.safetensors"  # beside the best network, `MODEL_FILE`
@@ -107,6 +107,8 @@ def train(
     config = replace(config, shrink=patches.shrink)
     if resume and is_main and not (run_dir / CONFIG_FILE).is_file():
         raise FsidError(f"{run_dir}: holds no training to resume")
+    if is_main:
+        check_folder(run_dir)
     initial = initial_network(run_dir, config, resume=resume)
     shown = is_main and not quiet and progress is None
     if shown and config.held_out and not kept:
