@@ -136,7 +136,7 @@ def _run(arguments: Sequence[str] | None) -> None:
     except KeyboardInterrupt as signalled:
         what, code = ("terminated", 143) if isinstance(signalled, _Terminated) else ("interrupted", 130)
         goes_on = set(sys.argv[1:2] if arguments is None else arguments[:1]) & RESUMABLE
-        hint = "; run the same command again to continue" if goes_on else ""
+        hint = "; the same command goes on from what is finished" if goes_on else ""
         Console(stderr=True).print(f"fsid: {what}{hint}")
         sys.exit(code)
 
