@@ -191,9 +191,26 @@ def test_hidden_files_are_no_photographs(photos, tmp_path):
     assert inspect(tmp_path).pictures == 1
 
 
-def test_halves_of_one_picture_are_no_yardstick(photos):
-    assert all(np.isnan(found.yardstick) for found in inspect(photos, photos, limit=3).comparisons)
-    assert any(np.isfinite(found.yardstick) for found in inspect(photos, photos).comparisons)
+def test_halves_of_few_pictures_are_no_yardstick(photos, monkeypatch, capsys):
+    """Two halves of one collection differ by chance alone: a small reference makes everything look real."""
+    few = inspect(photos, photos)
+    assert all(np.isnan(found.yardstick) for found in few.comparisons)
+    assert few.yardstick.startswith("none: halves of 4 pictures")
+    main(["inspect", str(photos), "--reference", str(photos), "--quiet"])
+    assert "relative: none: halves of 4 pictures" in capsys.readouterr().out
+    monkeypatch.setattr("fsid.dataset.inspect.LEAST_PICTURES", 4)
+    many = inspect(photos, photos)
+    assert any(np.isfinite(found.yardstick) for found in many.comparisons)
+    assert "halves of the 4 pictures" in many.yardstick
+    assert "the aim of 2x is for --other" in many.yardstick
+
+
+def test_the_yardstick_of_a_second_real_set_is_named(photos, monkeypatch):
+    found = inspect(photos, photos, photos)
+    assert found.yardstick.startswith(f"1x is how far {photos} (4 pictures) lies from the 4 of")
+    assert "sets of fewer than 50 differ by chance" in found.yardstick
+    monkeypatch.setattr("fsid.dataset.inspect.LEAST_PICTURES", 4)
+    assert "by chance" not in inspect(photos, photos, photos).yardstick
 
 
 EYE = "[[1,0,0],[0,1,0],[0,0,1]]"

@@ -25,13 +25,13 @@ def inspect(
 
     Prints per statistic the means, the distance (mean shift between the two distributions, in standard
     deviations of the reference), and the distance relative to that between two sets of real photographs:
-    at most 2 is the aim.
+    at most 2 is the aim where --other names the second, better of 50 pictures or more.
 
     Args:
         data: Folder of a dataset (fsid generate) or of photographs.
         reference: Folder of real photographs, or a dataset, to compare with.
-        other: A second real set; its distance to the reference is the yardstick. Without it the two halves of
-            the reference are compared with each other, which is stricter.
+        other: A second real set; its distance to the reference is the yardstick. Without it that is the
+            distance of the two halves of the reference, by chance alone: the more pictures, the stricter.
         out: Folder for statistics.json and statistics.png.
         limit: Largest number of pictures to measure of each set, evenly spaced.
         quiet: No progress bar.
@@ -62,7 +62,10 @@ def inspect(
             row += [f"{c.reference_mean:.4g}", f"{c.distance:.3f}"]
             row.append("" if math.isnan(c.yardstick) else f"{c.ratio:.1f}x")
         table.add_row(*row)
-    Console(markup=False).print(table)
+    console = Console(markup=False)
+    console.print(table)
+    if found.yardstick:
+        console.print(f"relative: {found.yardstick}.")
     if out is not None:
         results = {
             out / "statistics.png": inspection_picture(found),

@@ -29,6 +29,8 @@ from fsid.sensor.colour import is_of_camera
 
 MAX_PICTURES = 400
 """Of a larger set, this many pictures are measured, evenly spaced."""
+LEAST_PICTURES = 50
+"""Sets of fewer differ by chance about as much as sets of other pictures do."""
 PHOTO_CAMERA = "pixel6"
 
 Progress = Callable[[int, int], None]
@@ -36,7 +38,10 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True, eq=False)
 class Inspection:
-    """The statistics of a set, of its reference, and their distances. `reference` is None without one."""
+    """The statistics of a set, of its reference, and their distances. `reference` is None without one.
+
+    yardstick: in words, what distances are relative to.
+    """
 
     data: str
     pictures: int
@@ -44,6 +49,7 @@ class Inspection:
     reference: dict[str, np.ndarray] | None = None
     reference_name: str = ""
     comparisons: tuple[Comparison, ...] = ()
+    yardstick: str = ""
 
 
 def inspect(
@@ -57,8 +63,8 @@ def inspect(
     """Measure `data`, and compare it with `reference`, both a dataset or a folder of photographs.
 
     other: a second real set, whose distance to the reference is the yardstick; without it the two halves of
-    the reference (every second picture) take its place, where it has four pictures or more. Raises FsidError,
-    also for a reference of one picture.
+    the reference (every second picture) take its place, where it has `LEAST_PICTURES` or more. These differ
+    by chance alone, the less the more pictures there are. Raises FsidError, also for a reference of one.
     """
     if limit < 1:
         raise FsidError(f"--limit {limit}: measure at least one picture")
@@ -78,18 +84,35 @@ def inspect(
     if reference is None:
         return Inspection(str(data), len(measured[0]), values)
     real = pool(measured[1])
+    count = len(measured[1])
     if other is not None:
         comparisons = compare(values, real, pool(measured[2]))
-    elif len(measured[1]) > 3:
+        least = min(count, len(measured[2]))
+        yardstick = (
+            f"1x is how far {other} ({len(measured[2])} pictures) lies from the {count} of {reference}"
+        )
+        if least < LEAST_PICTURES:
+            yardstick += f"; sets of fewer than {LEAST_PICTURES} differ by chance, so relative is too small"
+    elif count >= LEAST_PICTURES:
         halves = compare(pool(measured[1][::2]), pool(measured[1][1::2]))
         found = compare(values, real)
         comparisons = [
             Comparison(f.name, f.mean, f.reference_mean, f.distance, half.distance)
             for f, half in zip(found, halves, strict=True)
         ]
+        yardstick = (
+            f"1x is how far the halves of the {count} pictures of {reference} lie apart by chance, the less "
+            "the more they are; the aim of 2x is for --other, a second real set"
+        )
     else:
         comparisons = compare(values, real)
-    return Inspection(str(data), len(measured[0]), values, real, str(reference), tuple(comparisons))
+        yardstick = (
+            f"none: halves of {count} pictures differ by chance too much, {LEAST_PICTURES} are the least; "
+            "--other takes a second real set"
+        )
+    return Inspection(
+        str(data), len(measured[0]), values, real, str(reference), tuple(comparisons), yardstick
+    )
 
 
 def inspection_json(inspection: Inspection) -> bytes:
@@ -99,6 +122,7 @@ def inspection_json(inspection: Inspection) -> bytes:
         "pictures": inspection.pictures,
         "mean": {name: float(values.mean()) for name, values in inspection.values.items()},
         "reference": inspection.reference_name,
+        "yardstick": inspection.yardstick,
         "statistics": [_finite(asdict(c)) for c in inspection.comparisons],
     }
     return (json.dumps(content, indent=1) + "\n").encode()

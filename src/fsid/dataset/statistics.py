@@ -71,7 +71,7 @@ class Comparison:
 
     @property
     def ratio(self) -> float:
-        """distance / yardstick; at most 2 is the aim."""
+        """distance / yardstick; at most 2 is the aim where the yardstick is a second real set."""
         if self.yardstick == 0:
             return 1.0 if self.distance == 0 else float("inf")
         return self.distance / self.yardstick
