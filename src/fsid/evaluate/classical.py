@@ -75,7 +75,7 @@ def _anscombe(counts: np.ndarray, s2: np.ndarray) -> np.ndarray:
 
 
 def _unbiased_inverse(y: np.ndarray, s2: np.ndarray) -> np.ndarray:
-    """E(x) from E(y), for y above the value 2 sqrt(3/8 + s^2) that y has at x = 0; linear below it."""
+    """E(x) from E(y) in closed form; its pole is at y = 0, so what is below 1 counts as 1."""
     y = np.maximum(y, 1.0)
     root = np.sqrt(1.5)
     return y**2 / 4 + root / 4 / y - 11 / 8 / y**2 + 5 * root / 8 / y**3 - 0.125 - s2
