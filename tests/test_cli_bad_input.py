@@ -86,6 +86,21 @@ CASES = [
     ("generate {0}/out --only {0}/a.json --count 1", "a.json: the file says all"),
     ("generate {0}/out --only {0}/a.json --seed 0", "a.json: the file says all"),
     ("generate {0}/out --only {0}/a.json --width 64", "a.json: the file says all"),
+    (
+        "generate {0}/out --count 1 --set scene.hdri_share=1",
+        "hdri_share: has no effect while scene.hdri",
+    ),
+    (
+        "generate {0}/out --count 1 --variant objects --set scene.placement.size_m=[1,2]",
+        "size_m: has no effect on --variant objects",
+    ),
+    (
+        "generate {0}/out --count 1 --task burst --set scene.motion.speed_m_s=[1,2]",
+        "speed_m_s: has no effect while scene.motion.moving_share is 0",
+    ),
+    ("preview {0}/out.png --set iso_range=[800,800]", "iso_range: has no effect on fsid preview"),
+    ("scene 3 -o {0}/s.json --set texture_size=256", "texture_size: has no effect on fsid scene"),
+    ("scene 3 -o {0}/s.json --set renderer=reference", "renderer: has no effect on fsid scene"),
     ("preview {0}/out.png --seed -1", "seed -1"),
     ("preview {0}/out.png --set scene.objects=5", "fsid: --set: scene.objects: 5 is not a list; write [5,5]"),
     ("generate {0}/out --count 1 --config {0}/mixed.yaml", "mixed.yaml: no such key: width"),

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import io
 import struct
-from dataclasses import replace
+from dataclasses import fields, replace
+from operator import attrgetter
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -18,6 +19,7 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 from fsid.config import given_keys, load_settings
 from fsid.dataset import GenerateConfig, Sample, check_given, encode, make_sample, read_photo
 from fsid.dataset.attempt import _half_precision
+from fsid.dataset.given import _FIXED, _NEEDS
 from fsid.dataset.pictures import read_exr
 from fsid.dataset.tasks import BURST_FRAMES, scene_config, smaller, views_of_scene
 from fsid.errors import FsidError
@@ -106,6 +108,55 @@ def test_a_motion_of_one_s_own_is_taken_as_it_is_and_nothing_replaces_what_was_a
     check_given(config(*shaken), given_keys(shaken))
     assert scene_config(config(*shaken)).motion == config(*shaken).scene.motion
     check_given(config(*still), [])  # stated by a file: as if it were not
+
+
+IDLE = [
+    *(
+        (f"{needed}=0", f"{needed}=1", key)
+        for needed in _NEEDS
+        for key in _NEEDS[needed]
+        if "_share" in needed
+    ),
+    *(("scene.rig.eyes=1", "scene.rig.eyes=2", key) for key in _NEEDS["scene.rig.eyes"]),
+    *((f"{folders}=[]", "", key) for folders in _NEEDS for key in _NEEDS[folders] if "_folders" in folders),
+    *(("scene.hdri_folder=''", "", key) for key in _NEEDS["scene.hdri_folder"]),
+    *((f"variant={each}", "variant=full", key) for each in _FIXED for key in sorted(_FIXED[each])),
+]
+
+
+@pytest.mark.parametrize(("idle", "followed", "key"), [row for row in IDLE if row[2] != "lens_images"])
+def test_what_is_refused_changes_no_scene_and_what_is_taken_does(idle: str, followed: str, key: str) -> None:
+    group, _, name = key.rpartition(".")
+    knobs = attrgetter(group)(config())
+    limits = next(field for field in fields(knobs) if field.name == name).metadata.get("limits", (True,))
+    most = [limits[-1]] * 2 if isinstance(getattr(knobs, name), tuple) else limits[-1]
+    others = [
+        "scene.mesh_families=[desk_lamp,bottle,bush,tuft,branch]",
+        "scene.background.kind_shares=[0,0,0,1]",
+        "scene.motion.exposure_s=[0.1,0.1]",
+    ]
+    given = f"{key}={most}".lower()
+
+    def scenes(*settings: str) -> list[Scene]:
+        settled = config(*others, *settings)
+        return [sample(settled.scene, seed, variant=settled.variant) for seed in range(6)]
+
+    assert scenes(idle) == scenes(idle, given)
+    with pytest.raises(FsidError, match=f"{key}: has no effect"):
+        check_given(config(*others, idle, given), [key])
+    if followed:
+        assert scenes(followed) != scenes(followed, given)
+        check_given(config(*others, followed, given), [key])
+
+
+def test_commands_follow_what_they_show_alone() -> None:
+    check_given(config("scene.motion.frames=2"), ["scene.motion.frames", "width", "variant"], "scene")
+    check_given(config("images=photographs"), ["images", "cameras", "width"], "preview")
+    for command, key in (("scene", "texture_size"), ("scene", "images"), ("preview", "crops")):
+        with pytest.raises(FsidError, match=f"{key}: has no effect on fsid {command}"):
+            check_given(config(), [key], command)
+    with pytest.raises(FsidError, match="moving_share: has no effect on one frame while"):
+        check_given(config("scene.motion.moving_share=1"), ["scene.motion.moving_share"], "scene")
 
 
 def test_things_that_move_need_scenes(photos: Path) -> None:

@@ -19,8 +19,8 @@ def preview(
     seed: int = 0,
     config: Path | None = None,
     set: tuple[str, ...] = (),
-    width: int = 480,
-    height: int = 270,
+    width: int | None = None,
+    height: int | None = None,
     variant: Variant | None = None,
     quiet: bool = False,
 ) -> None:
@@ -33,19 +33,27 @@ def preview(
         count: Number of scenes.
         seed: Seed of the dataset.
         config: YAML file of settings or the name of a built-in one, as for fsid generate.
-        set: Single settings, key=value.
-        width: Width of one scene in pixels.
-        height: Height of one scene in pixels.
+        set: Single settings, key=value, of what the picture shows.
+        width: Width of one scene in pixels (default 480).
+        height: Height of one scene in pixels (default 270).
         variant: What varies between scenes (default full).
         quiet: No progress bar.
     """
-    from fsid.dataset import check_png, contact_sheet, dataset_config, generate_config, save_png
+    from fsid.config import given_keys
+    from fsid.dataset import (
+        check_given,
+        check_png,
+        contact_sheet,
+        dataset_config,
+        generate_config,
+        save_png,
+    )
 
     check_png(output)
-    overrides: list[Override] = [*set, ("width", width), ("height", height)]
-    if variant is not None:
-        overrides.append(("variant", variant))
-    settings = generate_config(config, overrides)
+    options = {"width": width, "height": height, "variant": variant}
+    given: list[Override] = [*set, *((key, value) for key, value in options.items() if value is not None)]
+    settings = generate_config(config, [("width", 480), ("height", 270), *given])
+    check_given(settings, given_keys(given), "preview")
     dataset_config(settings, seed)
     read_mesh_folders(settings.scene, quiet=quiet)
     with progress_bar("scenes", "scenes", quiet=quiet) as progress:

@@ -33,13 +33,14 @@ def scene(
         seed: Seed of the scene ("seed" inside a sample's KEY.json under "scene").
         output: File to write, .json or .glb.
         config: YAML file of settings or the name of a built-in one, as for fsid generate.
-        set: Single settings, key=value.
+        set: Single settings of the scene, key=value.
         width: Width of the camera's image in pixels (default 1920).
         height: Height of the camera's image in pixels (default 1080).
         variant: What varies between scenes (default full).
         texture_size: Pixels per side of a texture tile in a .glb, a power of two.
     """
-    from fsid.dataset import generate_config
+    from fsid.config import given_keys
+    from fsid.dataset import check_given, generate_config
     from fsid.dataset.tasks import scene_config
     from fsid.render.gltf import write_glb
     from fsid.scene import sample, scene_to_json
@@ -50,6 +51,7 @@ def scene(
     given = {"width": width, "height": height, "variant": variant}
     overrides: list[Override] = [*set, *((key, value) for key, value in given.items() if value is not None)]
     settings = generate_config(config, overrides)
+    check_given(settings, given_keys(overrides), "scene")
     chosen = sample(
         scene_config(settings),
         seed,
