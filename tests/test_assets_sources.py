@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import zipfile
 from pathlib import Path
 
@@ -13,6 +14,8 @@ import trimesh
 from fsid.assets import build_mesh
 from fsid.assets.sources import load_source, mesh_sources, survey_meshes
 from fsid.assets.sources.cleaning import KEPT_PARTS, KEPT_TRIANGLES, Triangles, clean
+from fsid.assets.sources.polygons import triangulated
+from fsid.assets.surfaces import face_areas
 from fsid.errors import FsidError
 
 FURNITURE = Path("/usr/share/sweethome3d/furniture")
@@ -85,6 +88,17 @@ SPELLINGS = {
     "old Macintosh lines": lambda text: text.replace(b"\n", b"\r"),
     "blanks at the ends": lambda text: text.replace(b"\n", b"  \n"),
     "other letters": lambda text: b"# caf\xe9\n" + text,
+    "comments behind data": lambda text: re.sub(rb"^([vf] .*)$", rb"\1# so", text, flags=re.MULTILINE),
+    "broken lines": lambda text: re.sub(rb"^(f \d+) ", b"\\1 \\\\\n  ", text, flags=re.MULTILINE),
+    "counted backwards": lambda text: re.sub(
+        rb"^f.*$",
+        lambda face: re.sub(rb"\d+", lambda index: b"%d/-1/-1" % (int(index[0]) - 9), face[0]),
+        text,
+        flags=re.MULTILINE,
+    ),
+    "normals and colours": lambda text: re.sub(
+        rb"^(v .*)$", rb"\1 0.5 0.5 0.5\nvn 0 0 1", text, flags=re.MULTILINE
+    ),
 }
 """The same OBJ as different programs write it."""
 
@@ -98,6 +112,43 @@ def test_an_obj_may_be_spelled_in_any_way(tmp_path: Path, spelling: str):
     np.testing.assert_array_equal(other.vertices, one.vertices)
     np.testing.assert_array_equal(other.faces, one.faces)
     assert other.part_names == one.part_names
+
+
+def test_an_obj_counts_backwards_from_the_last_vertex_so_far(tmp_path: Path):
+    cube = trimesh.creation.box((1.0, 1.0, 1.0))
+    lines = []
+    for k in range(3):
+        lines += [f"o cube{k}", *(f"v {x + 2 * k} {y} {z}" for x, y, z in cube.vertices)]
+        lines += [f"f {a - 8} {b - 8} {c - 8}" for a, b, c in cube.faces]
+    (tmp_path / "cubes.obj").write_text("\n".join(lines))
+    mesh = load_source(f"file:{tmp_path}/cubes.obj")
+    assert len(mesh.faces) == 36
+    np.testing.assert_allclose(np.ptp(mesh.vertices, axis=0), (5, 1, 1), rtol=1e-6)
+
+
+@pytest.mark.parametrize("corners", [4, 5, 6, 7, 20, 101])
+def test_triangles_of_a_concave_face_cover_it_once(corners: int):
+    """Stars in any plane, from any first corner, among convex faces of as many corners."""
+    rng = np.random.default_rng(corners)
+    flat, area = [], []
+    for convex in (False, True, False, False):
+        angle = 2 * np.pi * (np.arange(corners) + 0.9 * rng.random(corners)) / corners
+        radius = np.ones(corners) if convex else rng.uniform(0.1, 1.0, corners)
+        x, y = radius * np.cos(angle), radius * np.sin(angle)
+        flat.append(np.stack([x, y, 0 * x], axis=-1) @ np.linalg.qr(rng.normal(size=(3, 3)))[0])
+        area.append((x * np.roll(y, -1) - y * np.roll(x, -1)).sum() / 2)
+    vertices = np.concatenate(flat)
+    triangles, face = triangulated(vertices, np.arange(len(vertices)), np.full(4, corners))
+    assert len(triangles) == 4 * (corners - 2)
+    covered = np.bincount(face, face_areas(vertices, triangles))
+    np.testing.assert_allclose(covered, area, rtol=1e-9)
+
+
+def test_a_face_with_a_slit_to_its_hole_is_covered_once():
+    ring = [(0, 0), (3, 0), (3, 3), (0, 3), (0, 0), (1, 1), (1, 2), (2, 2), (2, 1), (1, 1)]
+    vertices = np.array([(x, 0.0, -y) for x, y in ring])
+    triangles, _ = triangulated(vertices, np.arange(10), np.array([10]))
+    assert face_areas(vertices, triangles).sum() == pytest.approx(8)
 
 
 def test_normals_are_smooth_where_the_shape_is_and_hard_where_it_is_not():

@@ -136,6 +136,13 @@ BYTES = {
     "points.obj": b"v 0 0 0\nv 1 0 0\n",
     "outside.obj": b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 900000000\n",
     "flat.obj": b"v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n",
+    "zero.obj": b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 1 2\n",
+    "too_far_back.obj": b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf -1 -2 -4\n",
+    "short.obj": b"v 0 0\nv 1 0 0 0\nv 0 1 0\nf 1 2 3\n",
+    "comb.obj": b"".join(b"v %d %d 0\n" % (i, i % 2 * 9) for i in range(60_000))
+    + b"v 0 -9 0\nf "
+    + b" ".join(b"%d" % (i + 1) for i in range(60_001)),
+    "crossed.obj": b"v nan 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3 4 2 3 1\nf 2 2 2 2\n",
     "nan.obj": b"v nan 0 0\nv 1 nan 0\nv inf 1 0\nf 1 2 3\n",
     "giant.obj": b"v 0 0 0\nv 1e300 0 0\nv 0 1e300 0\nf 1 2 3\n",
     "materials.obj": b"v 0 0 0\nv 1 0 0\nv 0 1 0\n"

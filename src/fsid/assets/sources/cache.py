@@ -25,7 +25,7 @@ from fsid.assets.bake_cache import cache_folder
 from fsid.assets.mesh import Mesh
 from fsid.assets.sources.limits import RefusedError
 
-_VERSION = 3
+_VERSION = 4
 """One more whenever the same file gives another mesh."""
 
 

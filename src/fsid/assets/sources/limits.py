@@ -19,7 +19,15 @@ MAX_TRIANGLES = 4_000_000
 """As read. What is kept is `cleaning.KEPT_TRIANGLES`."""
 
 MAX_PARTS = 5_000
-"""Materials of an OBJ; its reader's time grows with their square."""
+"""Materials of an OBJ."""
+
+MAX_LINE_BYTES = 16 * 2**20
+"""Of an OBJ."""
+
+MAX_EAR_WORK = 10**8
+"""Corners looked through to divide the concave faces of a mesh."""
+
+NO_VERTEX = "a face that names a vertex which does not exist"
 
 MAX_NODES = 5_000
 MAX_DEPTH = 200

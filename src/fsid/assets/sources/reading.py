@@ -1,4 +1,7 @@
-"""Bytes of a mesh file -> `Triangles`, through `trimesh`, with every stated number checked beforehand."""
+"""Bytes of a mesh file -> `Triangles`, with every stated number checked beforehand.
+
+`trimesh` reads all formats but OBJ: of that it takes only the commonest spelling.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,8 @@ import numpy as np
 
 from fsid.assets.sources.cleaning import Triangles
 from fsid.assets.sources.gltf_file import Fetch, plain_gltf
-from fsid.assets.sources.limits import MAX_FILE_BYTES, MAX_PARTS, MAX_TRIANGLES, NotNowError, RefusedError
+from fsid.assets.sources.limits import MAX_FILE_BYTES, MAX_TRIANGLES, NO_VERTEX, NotNowError, RefusedError
+from fsid.assets.sources.obj_file import read_obj
 
 MESH_SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl")
 
@@ -26,7 +30,7 @@ def read_triangles(data: bytes, suffix: str, fetch: Fetch) -> Triangles:
     if len(data) > MAX_FILE_BYTES:
         raise RefusedError(f"larger than {MAX_FILE_BYTES >> 20} MiB")
     try:
-        triangles = _joined(_geometries(data, suffix, fetch))
+        triangles = _used(read_obj(data) if suffix == ".obj" else _joined(_geometries(data, suffix, fetch)))
     except (RefusedError, KeyboardInterrupt):
         raise
     except (ImportError, MemoryError) as error:
@@ -47,8 +51,6 @@ def _geometries(data: bytes, suffix: str, fetch: Fetch) -> list[tuple[str, np.nd
     if suffix in (".glb", ".gltf"):
         data, resolver = plain_gltf(data, fetch)
         suffix = ".gltf"
-    elif suffix == ".obj":
-        data, resolver = _named_materials(_plain_lines(data))
     elif suffix == ".ply":
         _check_ply(data)
     loaded = trimesh.load_scene(io.BytesIO(data), suffix[1:], resolver=resolver, process=False)
@@ -63,23 +65,6 @@ def _geometries(data: bytes, suffix: str, fetch: Fetch) -> list[tuple[str, np.nd
     return pieces
 
 
-def _plain_lines(data: bytes) -> bytes:
-    """OBJ text with blanks in place of tabs, one line feed at every end of a line, and without byte order
-    mark or indentation: the format allows them, the reader does not."""
-    text = data.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-    return re.sub(rb"^ +", b"", text.replace(b"\t", b" "), flags=re.MULTILINE)
-
-
-def _named_materials(data: bytes) -> tuple[bytes, dict[str, bytes]]:
-    """An OBJ that names its materials from a list made here: the file's own .mtl is never opened."""
-    names = sorted(set(re.findall(rb"^usemtl +(\S[^\n]*?) *$", data, re.MULTILINE)))
-    if len(names) > MAX_PARTS:
-        raise RefusedError(f"{len(names):,} materials")
-    body = re.sub(rb"^mtllib[^\n]*$", b"", data, flags=re.MULTILINE)
-    library = b"".join(b"newmtl " + name + b"\n" for name in [*names, b"unused"])  # one alone is ignored
-    return b"mtllib names\n" + body, {"names": library}
-
-
 def _check_ply(data: bytes) -> None:
     """Elements stated in the header must fit into the file: none takes less than a byte."""
     header = data[: data.find(b"end_header")]
@@ -91,26 +76,31 @@ def _check_ply(data: bytes) -> None:
 
 
 def _joined(pieces: list[tuple[str, np.ndarray, np.ndarray]]) -> Triangles:
-    total = sum(len(faces) for _, _, faces in pieces)
-    if not total:
+    if not pieces:
         raise RefusedError("no triangles")
-    if total > MAX_TRIANGLES:
-        raise RefusedError(f"{total:,} triangles")
     names = list(dict.fromkeys(name for name, _, _ in pieces))
     vertices, faces, parts, start = [], [], [], 0
     for name, points, corners in pieces:
         points, corners = np.asarray(points, np.float64), np.asarray(corners, np.int64)
         if len(corners) and not 0 <= corners.min() <= corners.max() < len(points):
-            raise RefusedError("a face that names a vertex which does not exist")
+            raise RefusedError(NO_VERTEX)
         vertices.append(points.reshape(-1, 3))
         faces.append(corners.reshape(-1, 3) + start)
         parts.append(np.full(len(corners), names.index(name)))
         start += len(points)
-    points, corners = np.concatenate(vertices), np.concatenate(faces)
-    used = np.zeros(len(points), bool)
-    used[corners] = True  # what no face uses has no part in the extent, by which the unit is told
-    corners = (np.cumsum(used) - 1)[corners]
-    return Triangles(points[used], corners, np.concatenate(parts), tuple(names))
+    return Triangles(np.concatenate(vertices), np.concatenate(faces), np.concatenate(parts), tuple(names))
+
+
+def _used(triangles: Triangles) -> Triangles:
+    """What faces use: other points have no part in the extent, by which the unit is told."""
+    if not len(triangles.faces):
+        raise RefusedError("no triangles")
+    if len(triangles.faces) > MAX_TRIANGLES:
+        raise RefusedError(f"{len(triangles.faces):,} triangles")
+    used = np.zeros(len(triangles.vertices), bool)
+    used[triangles.faces] = True
+    corners = (np.cumsum(used) - 1)[triangles.faces]
+    return Triangles(triangles.vertices[used], corners, triangles.parts, triangles.names)
 
 
 def _one_line(error: BaseException) -> str:
