@@ -153,7 +153,7 @@ def test_sigterm_leaves_nothing_half_written(tiny: list[str], tmp_path: Path, wo
     command = ["generate", str(tmp_path), "--count", "2000", "--workers", workers, "--quiet", "--set"]
     settings = [*tiny, "noise_levels=1000"]  # so that a shard takes long
     ended = terminated(command + settings, lambda: list(tmp_path.glob(".shard-*.part")))
-    assert ended == (143, "fsid: terminated; run the same command again to continue")
+    assert ended == (143, "fsid: terminated; the same command goes on from what is finished")
     assert [path.name for path in tmp_path.iterdir()] == ["config.yaml"]
 
 
