@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import re
 import zipfile
@@ -334,6 +335,53 @@ def test_positions_of_normalised_integers_are_fractions(tmp_path: Path, kind: st
     mesh = load_source(f"file:{tmp_path}/cubes.gltf")
     expected = (1 - low, 1.5 * (1 - low), 4 - low)
     np.testing.assert_allclose(np.ptp(mesh.vertices, axis=0), expected, rtol=1e-4)
+
+
+def cube_gltf(*primitives: dict, **changes) -> str:
+    """A glTF of a cube whose six sides are accessors 1 to 6, of indices; 0 is its positions."""
+    cube = trimesh.creation.box((1.0, 2.0, 3.0))
+    order = np.argsort(cube.face_normals @ (1, 2, 3), kind="stable")
+    data = cube.vertices.astype("<f4").tobytes() + cube.faces[order].astype("<u2").tobytes()
+    side = {"bufferView": 1, "componentType": 5123, "count": 6, "type": "SCALAR"}
+    document = {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"name": "Cup", "primitives": primitives}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 8, "type": "VEC3"},
+            *({**side, "byteOffset": 12 * i} for i in range(6)),
+        ],
+        "bufferViews": [
+            {"buffer": 0, "byteLength": 96},
+            {"buffer": 0, "byteOffset": 96, "byteLength": 72},
+        ],
+        "buffers": [{"byteLength": 168, "uri": f"data:;base64,{base64.b64encode(data).decode()}"}],
+    }
+    return json.dumps(document | changes)
+
+
+def sides(**changes) -> list[dict]:
+    return [{"attributes": {"POSITION": 0}, "indices": i + 1, **changes} for i in range(6)]
+
+
+def test_materials_of_one_gltf_mesh_name_its_parts(tmp_path: Path):
+    """As Blender writes an object of several materials; a second object shows the same mesh."""
+    primitives = [side | {"material": i % 3} for i, side in enumerate(sides())]
+    del primitives[5]["material"]
+    text = cube_gltf(
+        *primitives,
+        materials=[{"name": "Glass"}, {"name": "Steel brushed"}, {}],
+        scenes=[{"nodes": [0, 1]}],
+        nodes=[{"mesh": 0}, {"mesh": 0, "translation": [4, 0, 0], "children": [2]}, {}],
+    )
+    (tmp_path / "cup.gltf").write_text(text)
+    mesh = load_source(f"file:{tmp_path}/cup.gltf")
+    assert len(mesh.faces) == 24
+    assert np.ptp(mesh.vertices, axis=0) == pytest.approx((5, 3, 2))
+    assert mesh.part_names == ("Glass", "Glass_1", "Steel brushed", "Steel brushed_1", "material2", "Cup")
+    assert np.bincount(mesh.face_parts).tolist() == [4] * 6
 
 
 @pytest.mark.parametrize("suffix", ["ply", "glb"])

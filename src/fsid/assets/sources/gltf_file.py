@@ -43,9 +43,10 @@ def plain_gltf(data: bytes, fetch: Fetch) -> tuple[bytes, dict[str, bytes]]:
     _check_counts(document)
     _check_graph(document)
     _float_positions(document, buffers)
+    _keep_triangles(document)
+    _split_by_material(document)
     plain = {key: document[key] for key in _KEPT if key in document}
     plain["buffers"] = [{"uri": name, "byteLength": len(content)} for name, content in buffers.items()]
-    plain["meshes"] = [_named_mesh(mesh, document.get("materials", [])) for mesh in document["meshes"]]
     return json.dumps(plain).encode(), buffers
 
 
@@ -146,17 +147,37 @@ def _triangle_count(mesh: dict[str, Any], accessors: list[dict[str, Any]]) -> in
     return sum(accessors[p.get("indices", p["attributes"]["POSITION"])]["count"] for p in shown) // 3
 
 
-def _named_mesh(mesh: dict[str, Any], materials: list[dict[str, Any]]) -> dict[str, Any]:
-    """Positions and indices of a mesh, under the name of its material where it has only one."""
-    primitives = [
-        {
-            "attributes": {"POSITION": p["attributes"]["POSITION"]},
-            **{key: p[key] for key in ("indices", "mode") if key in p},
-        }
-        for p in mesh["primitives"]
-        if p.get("mode", 4) in _TRIANGLE_MODES
-    ]
-    used = {p.get("material") for p in mesh["primitives"]}
-    only = used.pop() if len(used) == 1 else None
-    name = mesh.get("name", "part") if only is None else materials[only].get("name", f"material{only}")
-    return {"name": str(name), "primitives": primitives}
+def _keep_triangles(document: dict[str, Any]) -> None:
+    """Leave of every mesh what makes its triangles, and their material."""
+    for mesh in document["meshes"]:
+        mesh["primitives"] = [
+            {
+                "attributes": {"POSITION": p["attributes"]["POSITION"]},
+                **{key: p[key] for key in ("indices", "mode", "material") if key in p},
+            }
+            for p in mesh["primitives"]
+            if p.get("mode", 4) in _TRIANGLE_MODES
+        ]
+
+
+def _split_by_material(document: dict[str, Any]) -> None:
+    """A mesh of each material, under its name, instead of every mesh; a node of several gets children."""
+    materials, nodes = document.get("materials", []), document.get("nodes", [])
+    meshes: list[dict[str, Any]] = []
+    split = []
+    for mesh in document["meshes"]:
+        groups: dict[int | None, list[dict[str, Any]]] = {}
+        for primitive in mesh["primitives"]:
+            groups.setdefault(primitive.pop("material", None), []).append(primitive)
+        split.append(range(len(meshes), len(meshes) + len(groups)))
+        for i, primitives in groups.items():
+            name = mesh.get("name", "part") if i is None else materials[i].get("name", f"material{i}")
+            meshes.append({"name": str(name), "primitives": primitives})
+    for node in [node for node in nodes if "mesh" in node]:
+        shown = split[node.pop("mesh")]
+        if len(shown) == 1:
+            node["mesh"] = shown[0]
+        else:
+            node["children"] = [*node.get("children", ()), *range(len(nodes), len(nodes) + len(shown))]
+            nodes += [{"mesh": mesh} for mesh in reversed(shown)]  # the reader takes the last child first
+    document["meshes"] = meshes
