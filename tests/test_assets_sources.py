@@ -384,6 +384,30 @@ def test_materials_of_one_gltf_mesh_name_its_parts(tmp_path: Path):
     assert np.bincount(mesh.face_parts).tolist() == [4] * 6
 
 
+@pytest.mark.parametrize("indexed", [True, False])
+def test_a_gltf_fan_is_triangles(tmp_path: Path, indexed: bool):
+    """A hexagon about its first corner, whose other sides are no triangles."""
+    angle = np.radians(60 * np.arange(6))
+    points = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=-1).astype("<f4")
+    order = np.array([2, 3, 4, 5, 0, 1], "u1")
+    data = (points if indexed else points[order]).tobytes() + order.tobytes()
+    fan = {"attributes": {"POSITION": 0}, "mode": 6, **({"indices": 1} if indexed else {})}
+    text = cube_gltf(
+        fan,
+        {"attributes": {"POSITION": 0}, "mode": 1},
+        accessors=[
+            {"bufferView": 0, "componentType": 5126, "count": 6, "type": "VEC3"},
+            {"bufferView": 1, "componentType": 5121, "count": 6, "type": "SCALAR"},
+        ],
+        bufferViews=[{"buffer": 0, "byteLength": 72}, {"buffer": 0, "byteOffset": 72, "byteLength": 6}],
+        buffers=[{"byteLength": 78, "uri": f"data:;base64,{base64.b64encode(data).decode()}"}],
+    )
+    (tmp_path / "fan.gltf").write_text(text)
+    mesh = load_source(f"file:{tmp_path}/fan.gltf")
+    assert len(mesh.faces) == 4
+    assert face_areas(mesh.vertices.astype(float), mesh.faces).sum() == pytest.approx(1.5 * 3**0.5)
+
+
 @pytest.mark.parametrize("suffix", ["ply", "glb"])
 def test_points_without_a_face_have_no_part_in_the_size(tmp_path: Path, suffix: str):
     cube = trimesh.creation.box((1.0, 2.0, 3.0))

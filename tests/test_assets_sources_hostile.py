@@ -95,6 +95,11 @@ GLTF = {
         accessors=[*huge(3), {"bufferView": 0, "componentType": 5125, "count": 9, "type": "SCALAR"}],
         meshes=[{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
     ),
+    "fans of one accessor": gltf(
+        accessors=huge(11_000_000),
+        meshes=[{"primitives": [{"attributes": {"POSITION": 0}, "mode": 6}] * 9}],
+        nodes=[{}],
+    ),
     "wrong types": gltf(nodes="x", meshes={"a": 1}),
     "nothing": {},
 }

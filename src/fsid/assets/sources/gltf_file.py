@@ -25,8 +25,8 @@ Fetch = Callable[[str], bytes]
 _KEPT = ("asset", "scene", "scenes", "nodes", "meshes", "accessors", "bufferViews")
 _JSON, _BIN = 0x4E4F534A, 0x004E4942
 _PACKED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression")
-_TRIANGLE_MODES = (4, 5)
-_NORMALISED = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2"}
+_LIST, _STRIP, _FAN = 4, 5, 6
+_INTEGERS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4"}
 _URI = re.compile(rb'"uri"\s*:\s*("(?!data:)(?:[^"\\]|\\.){1,1000}")')
 
 
@@ -44,6 +44,7 @@ def plain_gltf(data: bytes, fetch: Fetch) -> tuple[bytes, dict[str, bytes]]:
     _check_graph(document)
     _float_positions(document, buffers)
     _keep_triangles(document)
+    _list_fans(document, buffers)
     _split_by_material(document)
     plain = {key: document[key] for key in _KEPT if key in document}
     plain["buffers"] = [{"uri": name, "byteLength": len(content)} for name, content in buffers.items()]
@@ -103,7 +104,10 @@ def _check_graph(document: dict[str, Any]) -> None:
     nodes = document.get("nodes", [])
     if len(nodes) > MAX_NODES:
         raise RefusedError(f"{len(nodes):,} nodes")
-    sizes = [_triangle_count(mesh, document["accessors"]) for mesh in document["meshes"]]
+    sizes = [
+        sum(_triangles(primitive, document["accessors"]) for primitive in mesh["primitives"])
+        for mesh in document["meshes"]
+    ]
     children = [child for node in nodes for child in node.get("children", ())]
     if len(children) != len(set(children)):
         raise RefusedError("a node with two parents")
@@ -131,20 +135,58 @@ def _float_positions(document: dict[str, Any], buffers: dict[str, bytes]) -> Non
     if sum(accessor["count"] for accessor in found) * 12 > MAX_FILE_BYTES:
         raise RefusedError(f"more than {MAX_FILE_BYTES >> 20} MiB of positions")
     for accessor in found:
-        view = document["bufferViews"][accessor["bufferView"]]
-        kind = np.dtype(_NORMALISED[accessor["componentType"]])
-        start = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
-        strides = (view.get("byteStride", 3 * kind.itemsize), kind.itemsize)
-        steps = np.ndarray((accessor["count"], 3), kind, buffers[f"buffer{view['buffer']}"], start, strides)
-        floats = np.maximum(steps / np.iinfo(kind).max, -1).astype("<f4").tobytes()
-        document["bufferViews"].append({"buffer": len(buffers), "byteLength": len(floats)})
-        buffers[f"buffer{len(buffers)}"] = floats
-        accessor |= {"bufferView": len(document["bufferViews"]) - 1, "byteOffset": 0, "componentType": 5126}
+        steps = _integers(document, buffers, accessor, 3)
+        floats = np.maximum(steps / np.iinfo(steps.dtype).max, -1).astype("<f4")
+        accessor |= {"bufferView": _stored(document, buffers, floats), "byteOffset": 0, "componentType": 5126}
 
 
-def _triangle_count(mesh: dict[str, Any], accessors: list[dict[str, Any]]) -> int:
-    shown = [p for p in mesh["primitives"] if p.get("mode", 4) in _TRIANGLE_MODES]
-    return sum(accessors[p.get("indices", p["attributes"]["POSITION"])]["count"] for p in shown) // 3
+def _list_fans(document: dict[str, Any], buffers: dict[str, bytes]) -> None:
+    """Fans of triangles as lists, each in a buffer of its own: the reader knows lists and strips."""
+    fans = [p for mesh in document["meshes"] for p in mesh["primitives"] if p.get("mode") == _FAN]
+    accessors = document["accessors"]
+    if sum(_triangles(fan, accessors) for fan in fans) * 12 > MAX_FILE_BYTES:
+        raise RefusedError(f"more than {MAX_FILE_BYTES >> 20} MiB of indices")
+    for fan in fans:
+        if "indices" in fan:
+            corners = _integers(document, buffers, accessors[fan["indices"]], 1)[:, 0]
+        else:
+            corners = np.arange(accessors[fan["attributes"]["POSITION"]]["count"])
+        rim = corners[1:]
+        listed = np.stack([rim[:-1], rim[1:], np.full_like(rim[1:], corners[0])], axis=-1).astype("<u4")
+        fan |= {"mode": _LIST, "indices": len(accessors)}
+        accessors.append(
+            {
+                "bufferView": _stored(document, buffers, listed),
+                "componentType": 5125,
+                "count": listed.size,
+                "type": "SCALAR",
+            }
+        )
+
+
+def _integers(
+    document: dict[str, Any], buffers: dict[str, bytes], accessor: dict[str, Any], width: int
+) -> np.ndarray:
+    """(count, width) integers of an accessor, as they are stored."""
+    view = document["bufferViews"][accessor["bufferView"]]
+    kind = np.dtype(_INTEGERS[accessor["componentType"]])
+    start = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
+    strides = (view.get("byteStride", width * kind.itemsize), kind.itemsize)
+    return np.ndarray((accessor["count"], width), kind, buffers[f"buffer{view['buffer']}"], start, strides)
+
+
+def _stored(document: dict[str, Any], buffers: dict[str, bytes], values: np.ndarray) -> int:
+    """Number of a new view, of a new buffer that holds `values`."""
+    document["bufferViews"].append({"buffer": len(buffers), "byteLength": values.nbytes})
+    buffers[f"buffer{len(buffers)}"] = values.tobytes()
+    return len(document["bufferViews"]) - 1
+
+
+def _triangles(primitive: dict[str, Any], accessors: list[dict[str, Any]]) -> int:
+    """How many a primitive has."""
+    corners = accessors[primitive.get("indices", primitive["attributes"]["POSITION"])]["count"]
+    mode = primitive.get("mode", _LIST)
+    return corners // 3 if mode == _LIST else max(corners - 2, 0) if mode in (_STRIP, _FAN) else 0
 
 
 def _keep_triangles(document: dict[str, Any]) -> None:
@@ -156,7 +198,7 @@ def _keep_triangles(document: dict[str, Any]) -> None:
                 **{key: p[key] for key in ("indices", "mode", "material") if key in p},
             }
             for p in mesh["primitives"]
-            if p.get("mode", 4) in _TRIANGLE_MODES
+            if _triangles(p, document["accessors"])
         ]
 
 
