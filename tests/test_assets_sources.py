@@ -384,6 +384,28 @@ def test_materials_of_one_gltf_mesh_name_its_parts(tmp_path: Path):
     assert np.bincount(mesh.face_parts).tolist() == [4] * 6
 
 
+def test_shape_keys_and_what_else_is_left_of_a_gltf_may_be_sparse_or_huge(tmp_path: Path):
+    shape_key = {"componentType": 5126, "count": 8, "type": "VEC3", "sparse": {"count": 1}}
+    never_read = {"bufferView": 0, "componentType": 5126, "count": 10**12, "type": "VEC2"}
+    document = json.loads(cube_gltf(*sides(targets=[{"POSITION": 7}])))
+    document["accessors"] += [shape_key, never_read]
+    document["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = 8
+    (tmp_path / "cube.gltf").write_text(json.dumps(document))
+    mesh = load_source(f"file:{tmp_path}/cube.gltf")
+    np.testing.assert_allclose(np.ptp(mesh.vertices, axis=0), (1, 3, 2), rtol=1e-6)
+    assert len(mesh.faces) == 12
+
+
+@pytest.mark.parametrize("scenes", [{}, {"scenes": [{"nodes": [0, 1]}]}])
+def test_a_gltf_without_scenes_shows_all_its_nodes(tmp_path: Path, scenes: dict):
+    nodes = [{"children": [2]}, {"mesh": 0, "translation": [4, 0, 0]}, {"mesh": 0}]
+    document = json.loads(cube_gltf(*sides(), nodes=nodes))
+    del document["scene"], document["scenes"]
+    (tmp_path / "cubes.gltf").write_text(json.dumps(document | scenes))
+    mesh = load_source(f"file:{tmp_path}/cubes.gltf")
+    np.testing.assert_allclose(np.ptp(mesh.vertices, axis=0), (5, 3, 2), rtol=1e-6)
+
+
 @pytest.mark.parametrize("indexed", [True, False])
 def test_a_gltf_fan_is_triangles(tmp_path: Path, indexed: bool):
     """A hexagon about its first corner, whose other sides are no triangles."""

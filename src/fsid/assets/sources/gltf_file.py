@@ -40,12 +40,13 @@ def plain_gltf(data: bytes, fetch: Fetch) -> tuple[bytes, dict[str, bytes]]:
         if name in _PACKED:
             raise RefusedError(f"compressed with {name}, which is not supported")
     buffers = _buffers(document, binary, fetch)
-    _check_counts(document)
+    _keep_triangles(document)
     _check_graph(document)
     _float_positions(document, buffers)
-    _keep_triangles(document)
     _list_fans(document, buffers)
     _split_by_material(document)
+    if not document.get("scenes"):
+        document |= {"scene": 0, "scenes": [{"nodes": sorted(_roots(document["nodes"]))}]}
     plain = {key: document[key] for key in _KEPT if key in document}
     plain["buffers"] = [{"uri": name, "byteLength": len(content)} for name, content in buffers.items()]
     return json.dumps(plain).encode(), buffers
@@ -91,8 +92,22 @@ def _buffers(document: dict[str, Any], binary: bytes | None, fetch: Fetch) -> di
     return out
 
 
-def _check_counts(document: dict[str, Any]) -> None:
-    for accessor in document.get("accessors", []):
+def _keep_triangles(document: dict[str, Any]) -> None:
+    """Leave of meshes what makes their triangles, and materials; of accessors, what these triangles need."""
+    accessors = document["accessors"]
+    kept: dict[int, int] = {}
+    for mesh in document["meshes"]:
+        mesh["primitives"] = [
+            {
+                "attributes": {"POSITION": kept.setdefault(p["attributes"]["POSITION"], len(kept))},
+                **({"indices": kept.setdefault(p["indices"], len(kept))} if "indices" in p else {}),
+                **{key: p[key] for key in ("mode", "material") if key in p},
+            }
+            for p in mesh["primitives"]
+            if _triangles(p, accessors)
+        ]
+    document["accessors"] = [accessors[i] for i in kept]
+    for accessor in document["accessors"]:
         if not 0 <= accessor["count"] <= 3 * MAX_TRIANGLES:
             raise RefusedError(f"an accessor of {accessor['count']:,} elements")
         if "bufferView" not in accessor or "sparse" in accessor:
@@ -108,10 +123,7 @@ def _check_graph(document: dict[str, Any]) -> None:
         sum(_triangles(primitive, document["accessors"]) for primitive in mesh["primitives"])
         for mesh in document["meshes"]
     ]
-    children = [child for node in nodes for child in node.get("children", ())]
-    if len(children) != len(set(children)):
-        raise RefusedError("a node with two parents")
-    level = set(range(len(nodes))) - set(children)
+    level = _roots(nodes)
     total = depth = reached = 0
     while level:
         reached += len(level)
@@ -124,6 +136,14 @@ def _check_graph(document: dict[str, Any]) -> None:
             )
     if reached != len(nodes):
         raise RefusedError("nodes in a circle")
+
+
+def _roots(nodes: list[dict[str, Any]]) -> set[int]:
+    """Nodes without a parent. Raises RefusedError where a node has two."""
+    children = [child for node in nodes for child in node.get("children", ())]
+    if len(children) != len(set(children)):
+        raise RefusedError("a node with two parents")
+    return set(range(len(nodes))) - set(children)
 
 
 def _float_positions(document: dict[str, Any], buffers: dict[str, bytes]) -> None:
@@ -187,19 +207,6 @@ def _triangles(primitive: dict[str, Any], accessors: list[dict[str, Any]]) -> in
     corners = accessors[primitive.get("indices", primitive["attributes"]["POSITION"])]["count"]
     mode = primitive.get("mode", _LIST)
     return corners // 3 if mode == _LIST else max(corners - 2, 0) if mode in (_STRIP, _FAN) else 0
-
-
-def _keep_triangles(document: dict[str, Any]) -> None:
-    """Leave of every mesh what makes its triangles, and their material."""
-    for mesh in document["meshes"]:
-        mesh["primitives"] = [
-            {
-                "attributes": {"POSITION": p["attributes"]["POSITION"]},
-                **{key: p[key] for key in ("indices", "mode", "material") if key in p},
-            }
-            for p in mesh["primitives"]
-            if _triangles(p, document["accessors"])
-        ]
 
 
 def _split_by_material(document: dict[str, Any]) -> None:
