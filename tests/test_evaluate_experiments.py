@@ -14,7 +14,7 @@ import pytest
 
 from fsid.cli.main import main
 from fsid.cli.progress import progress_bar
-from fsid.config import read_yaml
+from fsid.config import read_yaml, save_settings
 from fsid.evaluate.claim import claimed
 from fsid.evaluate.compare import ImageRow
 from fsid.evaluate.dead_leaves import RADIUS_PX, dead_leaves_rand
@@ -110,6 +110,21 @@ def test_sources_of_all_sizes_are_trained_on_alike(tmp_path: Path):
     assert _training(replace(config, network=str(network)), 3).shrink == (1, 2)
 
 
+def test_rivals_trained_on_the_noise_of_other_cameras_are_not_gone_on_with(tmp_path: Path, capsys):
+    config = replace(scale_config("ablation", "smoke"), count=2, steps=3)
+    with claimed(tmp_path, config, "experiment"):
+        pass
+    (tmp_path / "runs" / "objects-seed0").mkdir(parents=True)
+    begun = replace(_training(config, 0), profiles=("pixel6", "galaxy-s22"))
+    save_settings(begun, tmp_path / "runs" / "objects-seed0" / "config.yaml")
+    before = sorted(tmp_path.rglob("*"))
+    with pytest.raises(SystemExit) as stop:
+        main(["experiment", "ablation", "-o", str(tmp_path), *SMOKE])
+    assert stop.value.code == 2
+    assert "config.yaml: was trained on the noise of pixel6, galaxy-s22" in capsys.readouterr().err
+    assert sorted(tmp_path.rglob("*")) == before
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -124,6 +139,7 @@ def test_sources_of_all_sizes_are_trained_on_alike(tmp_path: Path):
         (["ablation", "--set", "scene.objects=[1,2]", "variant=objects"], "--set variant: is no setting of"),
         (["ablation", "--set", "images=materials"], "--set images: is no setting of the scenes"),
         (["ablation", "--set", "cameras=[galaxy-s22]"], "--set cameras: is no setting of the scenes"),
+        (["ablation", "--set", "scene.hdri_share=1"], "scene.hdri_share: has no effect while"),
         (["ablation", "--width", "101"], "width: 101"),
         (["real-vs-synthetic", "--photos", "."], "holds no picture"),
         (["ablation", "--test", "."], "holds no photograph"),

@@ -18,8 +18,16 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Literal
 
-from fsid.config import Override, load_settings
-from fsid.dataset import RENDERED, GenerateConfig, check_pictures, find_photos, find_pictures, generate
+from fsid.config import Override, given_keys, load_settings
+from fsid.dataset import (
+    RENDERED,
+    GenerateConfig,
+    check_given,
+    check_pictures,
+    find_photos,
+    find_pictures,
+    generate,
+)
 from fsid.denoise import TrainConfig, train, train_config
 from fsid.errors import FsidError
 from fsid.evaluate.claim import claimed
@@ -135,6 +143,7 @@ def experiment(out: Path, config: ExperimentConfig, bar: ProgressBar, *, workers
     """
     _check(out, config, bar, workers)
     with claimed(out, config, "experiment"):
+        _check_noise(out, config)
         return _run(out, config, bar, workers)
 
 
@@ -170,12 +179,25 @@ def _check(out: Path, config: ExperimentConfig, bar: ProgressBar, workers: int) 
     for source in SOURCES[config.kind]:
         _generator(out, config, source)
         _count(config, source)
+    check_given(_generator(out, config, SCENES), given_keys(config.settings))
     pictures = [path for folder in config.tests for path in find_photos(Path(folder))]
     if PHOTOGRAPHS in SOURCES[config.kind]:
         pictures += find_pictures(Path(config.photos))
     if pictures and not (out / "experiment.yaml").exists():
         with bar("checking photographs", "pictures") as progress:
             check_pictures(pictures, min(workers, os.cpu_count() or 1), progress)
+
+
+def _check_noise(out: Path, config: ExperimentConfig) -> None:
+    """Before 16b339b trainings drew other noise than the camera's, and no two rivals may differ in that."""
+    profiles = _training(config, config.seeds[0]).profiles
+    for file in sorted((out / "runs").glob("*/config.yaml")):
+        begun = load_settings(TrainConfig, file).profiles
+        if begun != profiles:
+            raise FsidError(
+                f"{file}: was trained on the noise of {', '.join(begun)}, and the others would be on that of "
+                f"{', '.join(profiles)}; use another folder"
+            )
 
 
 def _training(config: ExperimentConfig, seed: int) -> TrainConfig:
