@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ from skimage import data
 
 from fsid.errors import FsidError
 from fsid.evaluate import denoise_classical, psnr, ssim
-from fsid.evaluate.classical import _anscombe, _unbiased_inverse
+from fsid.evaluate.classical import _anscombe, _bm3d, _unbiased_inverse
 from fsid.sensor import NoiseLevel, add_noise, clean_from_photo, load_profile, variance
 
 
@@ -86,6 +88,22 @@ def test_the_simulated_noise_has_the_stated_psnr(rng: np.random.Generator):
     clean = dataclasses.replace(clean, mosaic=np.clip(clean.mosaic, 0.2, 0.6))
     expected = -10 * np.log10(variance(clean.mosaic, level, clean.cfa).mean())
     assert psnr(add_noise(rng, clean, level).mosaic, clean.mosaic) == pytest.approx(expected, abs=0.1)
+
+
+def test_bm3d_gets_planes_of_independent_noise_of_the_strength_it_is_told(rng, monkeypatch):
+    """The first of them is the mean; and what BM3D leaves as it is comes back as it was."""
+    given = {}
+
+    def keep(planes: np.ndarray, sigma: np.ndarray) -> np.ndarray:
+        given["planes"], given["sigma"] = planes, sigma
+        return planes
+
+    monkeypatch.setitem(sys.modules, "bm3d", SimpleNamespace(bm3d=keep))
+    noise = rng.normal(size=(4, 200, 200))
+    np.testing.assert_allclose(_bm3d(noise), noise, atol=1e-6)
+    covariance = np.cov(given["planes"].reshape(-1, 4).T)
+    np.testing.assert_allclose(covariance, np.diag(given["sigma"] ** 2), atol=0.02)
+    np.testing.assert_allclose(given["planes"][..., 0], 2 * noise.mean(axis=0), atol=1e-6)
 
 
 def test_without_a_noise_level_the_classical_denoiser_says_so(rng: np.random.Generator):

@@ -25,6 +25,7 @@ from fsid.sensor import NoiseLevel, Raw, pack, unpack
 STRENGTH = 0.5
 PATCH_PX = 3
 SEARCH_PX = 7
+HADAMARD = np.array([[1, 1, 1, 1], [1, 1, -1, -1], [1, -1, -1, 1], [1, -1, 1, -1]], np.float32) / 2
 
 
 def denoise_classical(raw: Raw, level: NoiseLevel | None = None) -> Raw:
@@ -48,14 +49,15 @@ def bm3d_installed() -> bool:
 
 
 def _bm3d(stable: np.ndarray) -> np.ndarray:
-    """Groups are matched on the mean of the planes, whose noise is half as strong, and filtered in all."""
+    """Groups are matched on the first plane of a Hadamard transform, the planes' mean, and filtered in all.
+
+    It is orthonormal, so noise stays of variance 1 and independent from plane to plane.
+    """
     import bm3d
 
-    mean = stable.mean(axis=0)
-    planes = np.stack([mean, *(plane - mean for plane in stable[:3])], axis=-1)
-    smooth = bm3d.bm3d(planes, np.array([0.5, *[np.sqrt(0.75)] * 3]))
-    rest = np.moveaxis(smooth[..., 1:], -1, 0)
-    return smooth[..., 0] + np.stack([*rest, -rest.sum(axis=0)])
+    planes = np.tensordot(HADAMARD, stable, axes=1)
+    smooth = bm3d.bm3d(np.moveaxis(planes, 0, -1), np.ones(4))
+    return np.tensordot(HADAMARD, smooth, axes=(0, -1))
 
 
 def _nl_means(stable: np.ndarray) -> np.ndarray:
