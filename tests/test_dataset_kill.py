@@ -163,7 +163,7 @@ def test_sigterm_takes_a_half_made_test_set_away(tmp_path: Path) -> None:
     for i in range(40):
         picture.save(tmp_path / "photos" / f"{i}.png")
     command = ["testset", "photos", str(tmp_path / "photos"), "-o", str(tmp_path / "set"), "--quiet"]
-    ended = terminated(command, (tmp_path / ".set.part").exists)
+    ended = terminated(command, (tmp_path / "set" / ".testset.part").exists)
     assert ended == (143, "fsid: terminated")
     assert [path.name for path in tmp_path.iterdir()] == ["photos"]
 
