@@ -155,6 +155,41 @@ def test_an_exr_that_is_no_map_is_left_out(tmp_path, monkeypatch):
     assert "not numbers" in reasons["nan_1k"]
 
 
+@pytest.mark.parametrize(
+    ("colour", "size"), [("BaseColor", ""), ("base_color", ""), ("Albedo", ""), ("basecolor", "_2k")]
+)
+def test_the_colour_may_have_the_names_of_painting_programs(tmp_path, colour, size):
+    save(tmp_path / f"Tile_{colour}{size}.png", picture())
+    save(tmp_path / f"Tile_{'rough' if size else 'Roughness'}{size}.png", np.full((SIZE, SIZE), 0.3))
+    assert texture_sources(tmp_path) == (f"file:{tmp_path}/Tile{size}",)
+    assert bake_material(f"file:{tmp_path}", 0, 64).roughness.mean() == pytest.approx(0.3, abs=0.01)
+
+
+def test_pictures_of_no_set_are_listed_with_the_reason(folder):
+    usable = texture_sources(folder)
+    survey_textures.cache_clear()
+    for name in ("x_Color.tif", "y_Color.webp", "z_Color.tga", "holiday.jpg", "Metal002_2K-PNG_Sheen.png"):
+        (folder / name).write_bytes(b"")
+    passed_over = ("Metal002.png", "rock_wall/rock_wall.png", "Metal002_2K-PNG_AmbientOcclusion.png")
+    for name in (*passed_over, "plain_ao_1k.jpg", "readme.txt"):
+        (folder / name).write_bytes(b"")
+    survey = survey_textures(str(folder))
+    assert survey.usable == usable
+    unread, unnamed = "is no JPEG, PNG or OpenEXR", "is not named as ambientCG or Poly Haven do"
+    reasons = {
+        **dict.fromkeys(("x_Color.tif", "y_Color.webp", "z_Color.tga"), unread),
+        **dict.fromkeys(("holiday.jpg", "Metal002_2K-PNG_Sheen.png"), unnamed),
+    }
+    expected = {(f"file:{folder / name}", f"{name} {reason}") for name, reason in reasons.items()}
+    assert set(survey.skipped) == expected
+
+
+def test_a_folder_of_other_pictures_says_what_is_wrong_with_them(tmp_path):
+    (tmp_path / "x_Color.tif").write_bytes(b"")
+    with pytest.raises(FsidError, match=r"the first of 1 skipped: x_Color.tif is no JPEG"):
+        texture_sources(tmp_path)
+
+
 def test_a_set_in_several_colours_shows_the_first(tmp_path):
     save(tmp_path / "cloth_07_col_1_1k.png", picture(1))
     save(tmp_path / "cloth_07_col_2_1k.png", picture(2))

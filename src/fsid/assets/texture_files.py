@@ -3,9 +3,10 @@
     ambientCG    Bricks001_1K-JPG_Color.jpg   _NormalGL _NormalDX _Roughness _Metalness _Displacement
     Poly Haven   rock_wall_diff_1k.jpg        _nor_gl_ _nor_dx_ _rough_ _metal_ _disp_ _arm_
 
-Maps of data (all but the colour and the packed one) may be OpenEXR, as in the archives of Poly Haven. Images
-come from the internet: a header may promise any size and data may end anywhere. What a header says is
-compared with the limits before a pixel is read, and only formats with a well-tested decoder are read.
+In both, the colour may also be called BaseColor, Base_Color or Albedo, as painting programs call it. Maps of
+data (all but the colour and the packed one) may be OpenEXR, as in the archives of Poly Haven. Images come
+from the internet: a header may promise any size and data may end anywhere. What a header says is compared
+with the limits before a pixel is read, and only formats with a well-tested decoder are read.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import os
 import re
 import warnings
 from collections import defaultdict
+from collections.abc import Iterator
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -27,17 +29,19 @@ MAX_PIXELS = 8192 * 8192
 EXR_SUFFIX = ".exr"
 _SUFFIXES = r"(?P<suffix>\.(?:jpe?g|png|exr))"
 _AMBIENT_CG = re.compile(
-    r"(?P<set>.+)_(?P<map>color|normalgl|normaldx|roughness|metalness|displacement)" + _SUFFIXES,
+    r"(?P<set>.+?)_(?P<map>color|base_?color|albedo|normalgl|normaldx|roughness|metalness|displacement"
+    r"|ambientocclusion|opacity|emission)" + _SUFFIXES,
     re.IGNORECASE,
 )
 _POLY_HAVEN = re.compile(
-    r"(?P<set>.+)_(?P<map>diff|diffuse|col|albedo|nor_gl|nor_dx|rough|metal|disp|arm)(?:_0?\d)?_(?P<size>\d+k)"
-    + _SUFFIXES,
+    r"(?P<set>.+?)_(?P<map>diff|diffuse|col|albedo|base_?color|nor_gl|nor_dx|rough|metal|disp|arm"
+    r"|ao|spec|spec_ior|mask|opacity|translucent)(?:_0?\d)?_(?P<size>\d+k)" + _SUFFIXES,
     re.IGNORECASE,
 )
+_PICTURE = re.compile(r"(?P<stem>.+)\.(?:jpe?g|png|exr|tiff?|tga|webp|bmp)", re.IGNORECASE)
 _NEVER_EXR = ("colour", "arm")
 _ROLES = {
-    **dict.fromkeys(("color", "diff", "diffuse", "col", "albedo"), "colour"),
+    **dict.fromkeys(("color", "basecolor", "base_color", "diff", "diffuse", "col", "albedo"), "colour"),
     **dict.fromkeys(("normalgl", "nor_gl"), "normal_gl"),
     **dict.fromkeys(("normaldx", "nor_dx"), "normal_dx"),
     **dict.fromkeys(("roughness", "rough"), "roughness"),
@@ -45,6 +49,7 @@ _ROLES = {
     **dict.fromkeys(("displacement", "disp"), "height"),
     "arm": "arm",
 }
+"""Of the maps that are read; the others have known names, too."""
 
 
 class RefusedImageError(Exception):
@@ -63,18 +68,46 @@ class TextureSet:
 def sets_below(path: Path, deep: bool = True) -> list[TextureSet]:
     """The sets of a folder, and of its subfolders where `deep`, sorted; links to folders are not followed."""
     found: dict[Path, dict[str, Path]] = defaultdict(dict)
+    for folder, names in _folders(path, deep):
+        for name in names:
+            match = _match(name)
+            parts = match.groupdict() if match else {}
+            role = _ROLES.get(parts["map"].lower()) if match else None
+            if role:
+                files = found[folder / (parts["set"] + (f"_{parts['size']}" if parts.get("size") else ""))]
+                if parts["suffix"].lower() != EXR_SUFFIX or role not in _NEVER_EXR:
+                    files.setdefault(role, folder / name)
+    return [TextureSet(key, found[key]) for key in sorted(found)]
+
+
+def strangers_below(path: Path) -> list[tuple[Path, str]]:
+    """Pictures of a folder and its subfolders that are of no set, and why, sorted by folder.
+
+    Not among them: maps by known names that FSID has no use for, and the preview of a set (Bricks001.png).
+    """
+    out = []
+    for folder, names in _folders(path):
+        sets = [match["set"] for match in map(_match, names) if match]
+        previews = {*sets, *(name.rpartition("_")[0] for name in sets)}
+        for name in names:
+            picture = _PICTURE.fullmatch(name)
+            if not picture or picture["stem"] in previews or _match(name):
+                continue
+            read = re.search(_SUFFIXES + "$", name, re.IGNORECASE)
+            why = "is not named as ambientCG or Poly Haven do" if read else "is no JPEG, PNG or OpenEXR"
+            out.append((folder / name, f"{name} {why}"))
+    return out
+
+
+def _folders(path: Path, deep: bool = True) -> Iterator[tuple[Path, list[str]]]:
+    """Folders and the names of their files, sorted."""
     for folder, subfolders, names in os.walk(path):
         subfolders[:] = sorted(subfolders) if deep else []
-        for name in sorted(names):
-            match = _POLY_HAVEN.fullmatch(name) or _AMBIENT_CG.fullmatch(name)
-            if match:
-                parts = match.groupdict()
-                stem = parts["set"] + (f"_{parts['size']}" if parts.get("size") else "")
-                role = _ROLES[parts["map"].lower()]
-                files = found[Path(folder) / stem]
-                if parts["suffix"].lower() != EXR_SUFFIX or role not in _NEVER_EXR:
-                    files.setdefault(role, Path(folder) / name)
-    return [TextureSet(key, found[key]) for key in sorted(found)]
+        yield Path(folder), sorted(names)
+
+
+def _match(name: str) -> re.Match[str] | None:
+    return _POLY_HAVEN.fullmatch(name) or _AMBIENT_CG.fullmatch(name)
 
 
 def set_at(path: Path) -> TextureSet:

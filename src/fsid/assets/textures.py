@@ -30,6 +30,7 @@ from fsid.assets.texture_files import (
     resampled,
     set_at,
     sets_below,
+    strangers_below,
     within_one,
 )
 from fsid.assets.triangle import Triple, enclosing, encode, srgb_to_linear
@@ -49,7 +50,8 @@ _CODE = tuple(
 
 @dataclass(frozen=True)
 class TextureSurvey:
-    """usable: names for `Material.family`, sorted. skipped: (name, reason) of all others."""
+    """usable: names for `Material.family`, sorted. skipped: (name, reason) of all other sets, and of pictures
+    that are of no set."""
 
     usable: tuple[str, ...]
     skipped: tuple[tuple[str, str], ...]
@@ -79,6 +81,7 @@ def survey_textures(path: str) -> TextureSurvey:
             usable.append(name)
         except RefusedImageError as error:
             skipped.append((name, str(error)))
+    skipped += [(shown(f"{PREFIX}{file}"), shown(why)) for file, why in strangers_below(Path(path))]
     if not usable:
         why = f"; the first of {len(skipped)} skipped: {skipped[0][1]}" if skipped else ""
         raise FsidError(f"{path}: no usable texture set (ambientCG or Poly Haven file names){why}")

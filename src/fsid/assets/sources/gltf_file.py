@@ -46,7 +46,7 @@ def plain_gltf(data: bytes, fetch: Fetch) -> tuple[bytes, dict[str, bytes]]:
     _list_fans(document, buffers)
     _split_by_material(document)
     if not document.get("scenes"):
-        document |= {"scene": 0, "scenes": [{"nodes": sorted(_roots(document["nodes"]))}]}
+        document |= {"scene": 0, "scenes": [{"nodes": sorted(_roots(document.get("nodes", [])))}]}
     plain = {key: document[key] for key in _KEPT if key in document}
     plain["buffers"] = [{"uri": name, "byteLength": len(content)} for name, content in buffers.items()]
     return json.dumps(plain).encode(), buffers
