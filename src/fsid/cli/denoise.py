@@ -116,6 +116,10 @@ def denoise(
     _note_strong({input: noise}, quiet=quiet)
 
 
+def _note(line: str, *, quiet: bool = False) -> None:
+    Console(stderr=True, quiet=quiet).print(Text(f"note: {line}"), soft_wrap=True)
+
+
 def _note_black(layout: Layout, profile: str | None, *, quiet: bool) -> None:
     """A line where the calibration of the camera measured other black levels than those that are stated."""
     from fsid.sensor import load_bayer_profile
@@ -127,18 +131,18 @@ def _note_black(layout: Layout, profile: str | None, *, quiet: bool) -> None:
     black = measured.black.mean(axis=0)
     if np.abs(black - np.asarray(layout.black_level)).max() > SITES_APART_DN:
         levels = ",".join(f"{level:.4g}" for level in black)
-        line = f"note: without --black-level {levels}, as profile {profile} measured, a cast stays"
-        Console(stderr=True, quiet=quiet).print(Text(line), soft_wrap=True)
+        line = f"without --black-level {levels}, as profile {profile} measured, a cast stays"
+        _note(line, quiet=quiet)
 
 
 def _note_guessed(noises: Mapping[Path, Noise], *, quiet: bool) -> None:
     """A line on the files whose noise nothing states."""
     if guessed := [path for path, noise in noises.items() if noise.is_estimated]:
         line = (
-            f"note: the noise of {len(guessed)} of {len(noises)} files, the first one {guessed[0]}, is "
+            f"the noise of {len(guessed)} of {len(noises)} files, the first one {guessed[0]}, is "
             "estimated from the images; --profile and --iso state it"
         )
-        Console(stderr=True, quiet=quiet).print(Text(line), soft_wrap=True)
+        _note(line, quiet=quiet)
 
 
 def _note_strong(noises: Mapping[Path, Noise], *, quiet: bool) -> None:
@@ -148,10 +152,10 @@ def _note_strong(noises: Mapping[Path, Noise], *, quiet: bool) -> None:
     if strong := [path for path, noise in noises.items() if is_beyond_networks(noise.level)]:
         others = f" and {len(strong) - 1} more" if len(strong) > 1 else ""
         line = (
-            f"note: {strong[0]}{others}: more noise than networks keep all colours in "
+            f"{strong[0]}{others}: more noise than networks keep all colours in "
             f"(variance at mid-grey above {MAX_TOLD:g}); look at the result"
         )
-        Console(stderr=True, quiet=quiet).print(Text(line), soft_wrap=True)
+        _note(line, quiet=quiet)
 
 
 def _note_left_out(folder: Path, output: Path, *, bare: bool) -> None:
@@ -165,8 +169,8 @@ def _note_left_out(folder: Path, output: Path, *, bare: bool) -> None:
     inside, each = f"files in folders inside {folder}", "give each folder by itself"
     for what, left_out, advice in ((inside, below, each), (kind, others, how)):
         if left_out:
-            line = f"note: {what} are left out ({len(left_out)}, the first one {left_out[0]}); {advice}"
-            Console(stderr=True).print(Text(line), soft_wrap=True)
+            line = f"{what} are left out ({len(left_out)}, the first one {left_out[0]}); {advice}"
+            _note(line)
 
 
 def _check_layout(layout: Layout, paths: Sequence[Path]) -> None:

@@ -125,8 +125,7 @@ class PatchDataset(Dataset[Batch]):
     batch_size=None, sampler=range(1000), num_workers=2)`, or faster, `feed.batches(dataset, range(1000), 2)`.
     rank, world: this process among those that train together; None asks `torch.distributed`, and is 0 of 1
     where that was not set up. without: numbers of scenes to hold out as well. FsidError: a negative seed or
-    step, and what is wrong with the data or the
-    configuration.
+    step, and what is wrong with the data or the configuration.
     """
 
     def __init__(
