@@ -21,6 +21,7 @@ import numpy as np
 from fsid.errors import FsidError
 from fsid.sensor.bare import BARE_SUFFIXES, Layout, check_bayer, check_white, read_dn
 from fsid.sensor.black_levels import BlackLevels
+from fsid.sensor.defects import GAUSS_MAD
 from fsid.sensor.dng import RawHeader, read_header, read_stored
 from fsid.sensor.mosaic import check_cfa
 from fsid.sensor.quantise import check_levels
@@ -28,7 +29,6 @@ from fsid.sensor.quantise import check_levels
 SAME_LIGHT, SAME_DN = 0.03, 0.5  # difference of the levels of two frames of one burst, relative or in DN
 SAME_DARK = 3.0  # difference of the levels of two dark frames of one burst, in standard deviations of a pixel
 SAME_BLACK_DN = 1.0  # difference of the stated black levels of two frames of one mode: phones measure it anew
-_GAUSS_MAD = 0.6745  # median absolute deviation of a standard normal number
 _ISO_IN_PATH = re.compile(r"iso[-_ ]?(\d+)", re.IGNORECASE)
 _SITES_DIFFER = 0.02  # of the level: a flat grey through colour filters differs by far more
 
@@ -277,7 +277,7 @@ def _iso_in(path: Path) -> float:
 def _noise_dn(dn: np.ndarray) -> float:
     """Standard deviation of a pixel of an even picture, from neighbours of the same site in its row."""
     steps = np.abs(dn[:, 2:].astype(np.int32) - dn[:, :-2])
-    return float(np.median(steps)) / (_GAUSS_MAD * np.sqrt(2)) if steps.size else 0.0
+    return float(np.median(steps)) / (GAUSS_MAD * np.sqrt(2)) if steps.size else 0.0
 
 
 def _check_mono(path: Path, dn: np.ndarray) -> None:

@@ -5,8 +5,7 @@
 Kept are the tags that describe camera, colour, lens, exposure and time, value for value. Not kept are those
 that describe pixels as they were stored (compression, levels, linearisation: FSID writes its own), maker
 notes, whose inner offsets break when they move, and where the picture was taken: GPS, and XMP and IPTC, which
-may hold it. Files that are no TIFF (CR3,
-RAF) say orientation, exposure and lens through LibRaw instead.
+may hold it. Files that are no TIFF (CR3, RAF) say orientation, exposure and lens through LibRaw instead.
 """
 
 from __future__ import annotations
