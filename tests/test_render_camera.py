@@ -19,7 +19,7 @@ from fsid.render.flow import flow_between
 from fsid.scene import SceneConfig, sample
 from fsid.scene.distortion import distorted, fold_radius, undistorted
 from fsid.scene.model import Camera, Distortion, Motion, Transform
-from render_scenes import FROM_ABOVE, bake_plain, block, grid, lambertian, point_light, sphere, view
+from render_scenes import FROM_ABOVE, bake_plain, block, grid, lambertian, plain, point_light, sphere, view
 
 ONE = (1.0, 1.0, 1.0)
 BARREL = Distortion("brown-conrady", (-0.25, 0.06, 0.002, -0.001, 0.0))
@@ -90,6 +90,22 @@ def plane_hits(camera: Camera, sample_at: float) -> tuple[np.ndarray, np.ndarray
     rays = np.stack([p[..., 0], -p[..., 1], np.ones_like(x)], -1) @ lens.rotation
     depth = -lens.position[2] / rays[..., 2]
     return depth, lens.position + rays * depth[..., None]
+
+
+@pytest.mark.parametrize("name", LENSES)
+def test_a_pane_of_glass_shows_what_is_behind_it_where_the_lens_bends_it_to(
+    renderer: Renderer, name: str
+) -> None:
+    camera = replace(FROM_ABOVE, fov_deg=70.0, width=160, height=120, distortion=LENSES[name])
+    shining = replace(plain((0.5, 0.5, 0.5)), emission=1.0)
+    places = [(0.3 * x, 0.3 * y) for x in range(-5, 6) for y in range(-4, 5)]
+    squares = [replace(lambertian(grid(0.2), at=at(x, y)), materials=(shining,)) for x, y in places]
+    clear = replace(plain(ONE), transmission=1.0)
+    pane = replace(lambertian(block((8.0, 8.0, 0.002)), at=at(0, 0, 1.0), object_id=1), materials=(clear,))
+    bare = draw(renderer, view(*squares, camera=camera)).radiance
+    glazed = draw(renderer, view(*squares, pane, camera=camera))
+    assert (glazed.object_id == 1).all()
+    assert np.abs(glazed.radiance - bare).mean() < 0.02 * bare.mean()
 
 
 @pytest.mark.parametrize("name", LENSES)

@@ -9,18 +9,23 @@ uniform vec2 shift;        // of the image, pixels
 uniform vec2 lens_offset;  // of the rays (x, y): place on the lens / distance of the sharp plane
 uniform float k[5];
 
-// Normalised coordinates (x right, y down) whose distorted image is at `d`: Newton's method.
+// Distorted image coordinates of normalised ones (x right, y down), and the inverse, by Newton's method.
 #if LENS == 0
+vec2 distorted(vec2 p) { return p; }
 vec2 undistorted(vec2 d) { return d; }
 #elif LENS == 1
+vec2 distorted(vec2 p) {
+    float x = p.x, y = p.y, r2 = dot(p, p);
+    return p * (1.0 + r2 * (k[0] + r2 * (k[1] + r2 * k[4])))
+         + vec2(2.0 * k[2] * x * y + k[3] * (r2 + 2.0 * x * x), k[2] * (r2 + 2.0 * y * y) + 2.0 * k[3] * x * y);
+}
 vec2 undistorted(vec2 d) {
     vec2 p = d;
     for (int i = 0; i < 12; ++i) {
         float x = p.x, y = p.y, r2 = dot(p, p);
         float radial = 1.0 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]));
         float growth = 2.0 * (k[0] + r2 * (2.0 * k[1] + r2 * 3.0 * k[4]));
-        vec2 f = p * radial + vec2(2.0 * k[2] * x * y + k[3] * (r2 + 2.0 * x * x),
-                                   k[2] * (r2 + 2.0 * y * y) + 2.0 * k[3] * x * y) - d;
+        vec2 f = distorted(p) - d;
         float a = radial + growth * x * x + 2.0 * k[2] * y + 6.0 * k[3] * x;
         float b = growth * x * y + 2.0 * k[2] * x + 2.0 * k[3] * y;
         float e = radial + growth * y * y + 6.0 * k[2] * y + 2.0 * k[3] * x;
@@ -29,6 +34,11 @@ vec2 undistorted(vec2 d) {
     return p;
 }
 #else
+vec2 distorted(vec2 p) {
+    float r = length(p), theta = atan(r), t2 = theta * theta;
+    float bent = theta * (1.0 + t2 * (k[0] + t2 * (k[1] + t2 * (k[2] + t2 * k[3]))));
+    return p * (r > 1e-9 ? bent / r : 1.0);
+}
 vec2 undistorted(vec2 d) {
     float wanted = length(d), theta = min(wanted, 1.4);
     for (int i = 0; i < 12; ++i) {
@@ -48,10 +58,15 @@ vec3 ray_at(vec2 pixel) {
     return vec3(vec2(p.x, -p.y) - lens_offset, 1.0);
 }
 
-// Where the image shows a point (x right, y up, z forward), in its pixels; distortion aside.
+// Where the image shows a point (x right, y up, z forward), in its pixels. A bent lens shows what the G-buffer
+// does not reach at its border: beyond, its formula may fold back into the image.
 vec2 pixel_of(vec3 local) {
     vec2 p = local.xy / max(local.z, 1e-3) + lens_offset;
-    return (vec2(p.x, -p.y) * focal * 0.5 + 0.5) * vec2(size) + shift;
+    p.y = -p.y;
+#if LENS > 0
+    p = distorted(clamp(p, -1.0 / seen_focal, 1.0 / seen_focal));
+#endif
+    return (p * focal * 0.5 + 0.5) * vec2(size) + shift;
 }
 
 // Where the G-buffer sees a ray, in its pixels.
