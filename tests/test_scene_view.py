@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fsid.assets import build_background
+from fsid.assets import build_background, ground_height_m
 from fsid.errors import FsidError
 from fsid.render.camera import lens_of
 from fsid.scene import (
@@ -53,6 +53,27 @@ def test_converging_eyes_look_at_one_point():
     assert len({camera.target_m for camera in cameras}) == 1
     np.testing.assert_allclose(cameras[2].position_m, mono.position_m)
     np.testing.assert_allclose(cameras[2].target_m, mono.target_m)
+
+
+@pytest.mark.parametrize("kind", range(4))
+def test_no_eye_of_a_wide_rig_stands_behind_a_wall_or_in_a_hill(kind):
+    shares = tuple(float(kind == i) for i in range(4))
+    background = BackgroundConfig(kind_shares=shares, hills_m=(60, 60), ground_m=(150, 150))
+    rig, far = RigConfig(eyes=6, baseline_m=(4.0, 4.0)), CameraConfig(distance_m=(20, 40))
+    baselines = []
+    for seed in range(20):
+        drawn = scene(seed, rig=rig, camera=far, background=background)
+        eyes = np.array([camera.position_m for camera in drawn.cameras])
+        baselines.append(np.linalg.norm(eyes[1] - eyes[0]))
+        size_m = drawn.background.size_m
+        if drawn.background.kind == "open-air":
+            assert (eyes[:, 2] > ground_height_m(size_m, eyes[:, 0], eyes[:, 1])).all()
+        else:
+            floor_m = -0.75 if drawn.background.kind == "tabletop" else 0.0
+            half = np.array(size_m) / 2
+            assert (np.abs(eyes - (0, 0, floor_m + half[2])) < half).all()
+    assert 0.02 < min(baselines) < 3.9
+    assert kind < 3 or max(baselines) == pytest.approx(4.0)
 
 
 def test_a_burst_starts_with_the_single_picture_and_trembles_by_the_configured_amount():

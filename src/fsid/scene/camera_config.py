@@ -39,7 +39,7 @@ class RigConfig:
     eyes: int = knob(1, 1, 64)
     """Number of cameras, side by side, centred on the drawn view."""
     baseline_m: Range = knob((0.05, 0.08), 0.0, 10.0)
-    """Distance between neighbours."""
+    """Distance between neighbours; less where an eye would stand in a wall, behind one or in a hill."""
     convergence: float = knob(0.0, 0.0, 1.0)
     """0: parallel axes. 1: all look at the same point. Between: turned by that part."""
 

@@ -29,7 +29,7 @@ from fsid.scene.config import SceneConfig
 from fsid.scene.lens import lens_rand
 from fsid.scene.lights import lighting_rand
 from fsid.scene.materials import PLAIN, cast_rand, material_rand
-from fsid.scene.model import Camera, Material, Object, Scene, Transform
+from fsid.scene.model import Background, Camera, Material, Object, Scene, Transform
 from fsid.scene.placement import arranged, scattered
 from fsid.scene.pools import GROWN, NATURE
 from fsid.scene.sources import FILE, mesh_rand, sky_rand
@@ -74,7 +74,7 @@ def sample(
     B, mood = background_rand(np.random.default_rng(streams.B), config)
     space, outdoors = space_of(B), B.kind == "open-air"
     view, focus = camera_rand(np.random.default_rng(streams.camera), config.camera, B, width, height)
-    cameras = _cameras_rand(streams, config, view)
+    cameras = _cameras_rand(streams, config, view, B)
     sky_source = sky_rand(np.random.default_rng(streams.sky), config) if outdoors else None
     lighting = lighting_rand(
         streams.lights, config.lights, space, focus, np.array(view.position_m), sky_source
@@ -167,11 +167,11 @@ def _scattered_rand(
     return tuple(scattered(rngs, objects, space, focus_m, keep_clear_m, config.placement))
 
 
-def _cameras_rand(streams: Streams, config: SceneConfig, view: Camera) -> tuple[Camera, ...]:
+def _cameras_rand(streams: Streams, config: SceneConfig, view: Camera, B: Background) -> tuple[Camera, ...]:
     """The drawn view through its lens, then all eyes and frames, alike but for where they stand."""
     rngs = (np.random.default_rng(s) for s in (streams.lens, streams.rig, streams.shake))
     lens, rig, shake = rngs
-    eyes = rig_rand(rig, config.rig, lens_rand(lens, config.lens, view))
+    eyes = rig_rand(rig, config.rig, lens_rand(lens, config.lens, view), B)
     return burst_rand(shake, config.motion, eyes)
 
 

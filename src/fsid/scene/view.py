@@ -1,6 +1,6 @@
 """Cameras: one view of the focus, then the eyes of a rig and the frames of a burst around it.
 
-    eye e      moved by (e - (E - 1) / 2) baselines to the right
+    eye e      moved by (e - (E - 1) / 2) baselines to the right, less where a wall or hill is in the way
     frame f    at time f * interval: hand tremor is a sum of sines per axis, zero at time 0
 
 A sine has a derivative, so each frame knows the velocity that blurs it; amplitudes fall as 1 / frequency over
@@ -27,7 +27,10 @@ LOW_VIEW_DEG, LOW_VIEW_M = 20.0, 1.25
 """Below this elevation a camera keeps this distance: the fixed arrangement of v1-v3 ends before it."""
 SKYWARD_ELEVATION = 0.2
 """Views that look up are taken from so many times the elevation that was drawn."""
+EYE_SLACK_M = 0.15
+"""The eyes of a rig may be so much nearer to walls, and a third of it to the ground, than the drawn view."""
 
+_LEAST_BASELINE_M = 1e-3
 _TREMOR_HZ = (1.0, 12.0)
 _SINES = 6
 
@@ -72,18 +75,35 @@ def camera_rand(
     return Camera(vec3(position), vec3(target), vec3(up), fov_deg, width, height), focus
 
 
-def rig_rand(rng: np.random.Generator, config: RigConfig, camera: Camera) -> list[Camera]:
-    """The eyes of a rig; one eye is the camera itself."""
+def rig_rand(
+    rng: np.random.Generator, config: RigConfig, camera: Camera, background: Background
+) -> list[Camera]:
+    """The eyes of a rig; one eye is the camera itself. The baseline shrinks until all of them are inside."""
     baseline_m = float(rng.uniform(*config.baseline_m))
     position, target = np.array(camera.position_m), np.array(camera.target_m)
     right = np.cross(target - position, camera.up)
     right /= np.linalg.norm(right)
+    across = right * (np.arange(config.eyes) - (config.eyes - 1) / 2)[:, None]
+    while baseline_m > _LEAST_BASELINE_M and not _are_inside(position + across * baseline_m, background):
+        baseline_m *= 0.9
     eyes = []
     for eye in range(config.eyes):
         shift = right * baseline_m * (eye - (config.eyes - 1) / 2)
         aim = target + shift * (1 - config.convergence)
         eyes.append(replace(camera, position_m=vec3(position + shift), target_m=vec3(aim), eye=eye))
     return eyes
+
+
+def _are_inside(eyes_m: np.ndarray, background: Background) -> bool:
+    """Whether places (E, 3), around one that `camera_rand` has drawn, are off walls and above the ground."""
+    space = space_of(background)
+    slack_m = np.array((EYE_SLACK_M, EYE_SLACK_M, EYE_SLACK_M / 3))
+    if not ((eyes_m > space.low - slack_m) & (eyes_m < space.high + slack_m)).all():
+        return False
+    if background.kind != "open-air":
+        return True
+    ground_m = ground_height_m(background.size_m, eyes_m[:, 0], eyes_m[:, 1])
+    return bool((eyes_m[:, 2] > ground_m + space.low[2] - slack_m[2]).all())
 
 
 def burst_rand(rng: np.random.Generator, config: MotionConfig, eyes: list[Camera]) -> tuple[Camera, ...]:
