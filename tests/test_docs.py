@@ -30,6 +30,7 @@ GUIDES = (
     "experiments.md",
     "bring-your-own-meshes.md",
     "other-engines.md",
+    "stereo-and-labels.md",
 )
 
 
@@ -153,6 +154,23 @@ def test_the_python_of_the_guide_to_measuring_runs(desk: Path, monkeypatch: pyte
     rows = json.loads((desk / "compared.json").read_text())
     assert {row["model"] for row in rows} == {"noisy", "classical", "mine", "theirs"}
     assert all(row["psnr_raw"] is None or row["psnr_raw"] > 90 for row in rows if row["model"] == "theirs")
+
+
+def test_the_python_of_the_guide_to_stereo_makes_a_pair_whose_labels_lead_from_one_image_to_the_other(
+    desk: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Runs after the guides: one of them writes the scene."""
+    monkeypatch.chdir(desk)
+    text = (REPOSITORY / "docs" / "stereo-and-labels.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"```python\n(.*?)```", text, re.S)
+    exec(compile(block, "stereo-and-labels.md", "exec"), {})
+    with np.load("pair.npz") as pair:
+        left, right, disparity, visible = (pair[k] for k in ("left", "right", "disparity", "visible"))
+    assert 0.6 < visible.mean() < 1
+    rows, columns = np.indices(visible.shape)
+    there = np.rint(columns - disparity).astype(int).clip(0, visible.shape[1] - 1)
+    apart = np.abs(right[rows, there] - left)[visible].mean()
+    assert apart < 0.25 * np.abs(right - left)[visible].mean()
 
 
 def test_the_python_for_bare_mosaics_makes_captures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
