@@ -14,10 +14,12 @@ import numpy as np
 import pytest
 
 from fsid.render import Renderer
-from fsid.render.drawable import Drawable
-from render_scenes import FROM_ABOVE, STILL, bake_plain, grid, plain, view
+from fsid.render.drawable import Drawable, View, background_drawable
+from fsid.scene.model import Background, Transform
+from render_scenes import FROM_ABOVE, STILL, bake_plain, grid, plain, sphere, view
 
 WALKS, MOST_BOUNCES = 40_000, 40
+WHITE, BRIGHT, DARK = (1.0, 1.0, 1.0), (0.9, 0.9, 0.9), (0.02, 0.02, 0.02)
 
 
 @pytest.fixture(scope="module")
@@ -79,3 +81,18 @@ def test_a_rough_metal_shows_what_a_random_walk_does(renderer: Renderer, roughne
     shown = renderer.draw(what, bake=bake_plain).radiance[15:17, 15:17].mean()
     walk = walked(np.random.default_rng(1), roughness / 100, 0.6, f0)
     assert shown == pytest.approx(walk, rel=0.05)
+
+
+def test_a_rough_metal_blurs_the_edges_of_the_room(renderer: Renderer) -> None:
+    """A lobe at an edge meets walls on both sides of it, so no step runs over a ball of metal."""
+    names = ("floor", "ceiling", "wall_north", "wall_south", "wall_east", "wall_west")
+    materials = {name: plain(DARK if name in ("floor", "wall_east") else BRIGHT) for name in names}
+    room = background_drawable(Background("room", (4.0, 4.0, 3.0), materials))
+    at = Transform((0.0, 0.0, 0.9), (0.0, 0.0, 0.0), WHITE)
+    ball = Drawable(sphere(0.6), at, (plain(WHITE, roughness=30, family="metal"),), 0)
+    what = View((room, ball), (), WHITE, FROM_ABOVE, (4.0, 4.0, 3.0), room.materials)
+    frame = renderer.draw(what, bake=bake_plain)
+    light, inside = frame.radiance[..., 1], (frame.object_id == 0) & (frame.normal[..., 2] > 0.85)
+    assert np.ptp(light[inside]) > 0.6
+    steps = np.abs(np.diff(light, axis=1))[inside[:, 1:] & inside[:, :-1]]
+    assert steps.max() < 0.2 * np.ptp(light[inside])

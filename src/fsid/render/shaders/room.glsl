@@ -12,20 +12,48 @@ vec3 cube(vec3 sides[6], vec3 n) {
          + w.z * (n.z < 0.0 ? sides[5] : sides[4]);
 }
 
-// What a mirror of roughness alpha at `position` sees in direction r: the wall where the ray meets it, and
-// the rougher it is the more of whole walls, which blend where the room has edges.
+// Which part of a lobe of half width `wide` around r meets walls of one axis before walls of another: the room's edges
+// divide it. i, j: distances to the walls of either axis, positive side first; ri, rj: of r. For the pairs ++ +- -+ --.
+vec4 met_before(vec2 i, float ri, vec2 j, float rj, float wide) {
+    vec4 a = i.xxyy, b = j.xyxy;
+    vec4 apart = (vec4(ri, ri, -ri, -ri) * b - vec4(rj, -rj, rj, -rj) * a) * inversesqrt(max(a * a + b * b, 1e-12));
+    return smoothstep(-wide, wide, apart);
+}
+
+const float LOBE_WIDTH = 4.0;   // alpha: beyond lie 5 % of what GGX mirrors in one direction
+const float LEAST_WALL = 0.01;  // share of a lobe that is looked up
+
+// What a mirror of roughness alpha at `position` sees in direction r, a unit vector: the walls that a lobe around it
+// meets, and the rougher it is the more of whole walls.
 vec3 mirrored(vec3 position, vec3 r, float alpha) {
     vec3 p = clamp(position - room_centre, -room_half, room_half);
     vec3 ray = mix(r, vec3(1e-6), lessThan(abs(r), vec3(1e-6)));
     vec3 t = (sign(ray) * room_half - p) / ray;
-    int axis = t.x <= t.y && t.x <= t.z ? 0 : t.y <= t.z ? 1 : 2;
-    vec3 at = 0.5 + 0.5 * (p + ray * t[axis]) / room_half;
-    vec2 uv = vec2(at[(axis + 1) % 3], at[(axis + 2) % 3]);
+    float reach = min(t.x, min(t.y, t.z));
+    vec3 at = 0.5 + 0.5 * (p + ray * reach) / room_half;
     float texels = float(textureSize(room_radiance, 0).x);
     float width = 2.0 * min(room_half.x, min(room_half.y, room_half.z)) / texels;
-    float level = min(log2(1.0 + 2.0 * alpha * t[axis] / width), log2(texels));
-    vec3 wall = textureLod(room_radiance, vec3(uv, 2 * axis + (ray[axis] < 0.0 ? 1 : 0)), level).rgb;
-    return mix(wall, cube(mean_sides, r), smoothstep(0.0, 0.4, alpha));
+    float level = min(log2(1.0 + 2.0 * alpha * reach / width), log2(texels));
+    vec3 ahead = room_half - p, behind = room_half + p;
+    float wide = max(LOBE_WIDTH * alpha, 1e-3);
+    vec4 xy = met_before(vec2(ahead.x, behind.x), ray.x, vec2(ahead.y, behind.y), ray.y, wide);
+    vec4 yz = met_before(vec2(ahead.y, behind.y), ray.y, vec2(ahead.z, behind.z), ray.z, wide);
+    vec4 zx = met_before(vec2(ahead.z, behind.z), ray.z, vec2(ahead.x, behind.x), ray.x, wide);
+    vec4 yx = 1.0 - xy, zy = 1.0 - yz, xz = 1.0 - zx;
+    float share[6] = float[](xy[0] * xy[1] * xz[0] * xz[2], xy[2] * xy[3] * xz[1] * xz[3],
+                             yz[0] * yz[1] * yx[0] * yx[2], yz[2] * yz[3] * yx[1] * yx[3],
+                             zx[0] * zx[1] * zy[0] * zy[2], zx[2] * zx[3] * zy[1] * zy[3]);
+    int first = t.x <= reach ? 0 : t.y <= reach ? 2 : 4;
+    uint left = 1u << (first + (ray[first / 2] < 0.0 ? 1 : 0));
+    for (int side = 0; side < 6; ++side) left |= share[side] > LEAST_WALL ? 1u << side : 0u;
+    vec4 wall = vec4(0);
+    do {
+        int side = findLSB(left), axis = side / 2;
+        left &= left - 1u;
+        vec2 uv = vec2(at[(axis + 1) % 3], at[(axis + 2) % 3]);
+        wall += (share[side] + 1e-6) * vec4(textureLod(room_radiance, vec3(uv, side), level).rgb, 1.0);
+    } while (left != 0u);
+    return mix(wall.rgb / wall.a, cube(mean_sides, r), smoothstep(0.0, 0.4, alpha));
 }
 
 // Share of the surroundings that a surface reflects specularly: scale and offset of f0, and that of a clear coat
