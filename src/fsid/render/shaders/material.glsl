@@ -17,6 +17,7 @@ struct Matter {
     vec3 albedo;
     vec3 normal;      // world, with relief
     float alpha2;     // GGX
+    float lost;       // what the relief within the pixel adds to alpha2, of every layer
     float metallic;
 };
 
@@ -119,6 +120,7 @@ Matter matter_at(Surface s, vec3 position, vec3 normal, vec3 dx, vec3 dy) {
         } while (++patch_index < patch_count);
         m /= found;
         r /= found;
+        r.z *= min(exp2(level), 1.0);   // of a large texel a pixel covers a part
         vec2 slope = (r.xy * 255.0 - 128.0) / SLOPE_LEVELS * s.slope_scale;
         mask += weight[axis] * m;
         other += weight[axis] * r;
@@ -134,7 +136,8 @@ Matter matter_at(Surface s, vec3 position, vec3 normal, vec3 dx, vec3 dy) {
     Matter matter;
     matter.albedo = clamp(base * (mask.b * DETAIL), 0.0, 1.0);
     matter.normal = out_of(s.place, normalize(n - (gradient - n * dot(n, gradient))));
-    matter.alpha2 = roughness * roughness * roughness * roughness + 2.0 * spread * spread;
+    matter.alpha2 = roughness * roughness * roughness * roughness;
+    matter.lost = 2.0 * spread * spread;
     matter.metallic = other.a;
     return matter;
 }

@@ -69,7 +69,7 @@ Reflector reflector_of(Sample p, Surface s, Matter m, float spread) {
     b.v = normalize(origin - p.position);
     b.n = normalize(m.normal);
     b.r = reflect(-b.v, b.n);
-    b.alpha2 = min(m.alpha2 + 2.0 * spread, 1.0);
+    b.alpha2 = min(m.alpha2 + m.lost + 2.0 * spread, 1.0);
     b.alpha = sqrt(b.alpha2);
     float nv = max(abs(dot(b.n, b.v)), 1e-3);
     vec2 share = mirror_share(sqrt(b.alpha), nv);
@@ -79,11 +79,11 @@ Reflector reflector_of(Sample p, Surface s, Matter m, float spread) {
     b.diffuse *= 1.0 - s.transmission;
 #endif
 #if LOBES
-    b.coat_alpha = s.clearcoat_alpha;
+    b.coat_alpha = sqrt(min(s.clearcoat_alpha * s.clearcoat_alpha + m.lost + 2.0 * spread, 1.0));
     b.sheen = s.sheen;
     b.cloth = s.sheen * fuzz_share(nv);
     b.coated = s.clearcoat * (1.0 - b.cloth);
-    float coat = s.clearcoat * reflectance_at(sqrt(s.clearcoat_alpha), nv, 0.0).z;
+    float coat = s.clearcoat * reflectance_at(sqrt(b.coat_alpha), nv, 0.0).z;
     b.below = (1.0 - coat) * (1.0 - b.cloth);
     b.coat = coat * (1.0 - b.cloth);
     b.through = b.diffuse * s.translucency * b.below;
