@@ -383,6 +383,17 @@ def test_a_folder_that_cannot_be_written_is_one_line_before_the_work(
     assert not (tmp_path / "run").exists()
 
 
+def test_a_run_that_goes_on_keeps_the_figures_up_to_its_checkpoint_in_tensorboard(tmp_path: Path) -> None:
+    accumulator = pytest.importorskip("tensorboard.backend.event_processing.event_accumulator")
+    for first, steps in ((0, (2,)), (0, (2, 4, 6)), (4, (6,))):  # killed before a checkpoint, and after one
+        board = Board(tmp_path, first, wanted=True)
+        for step in steps:
+            board.write(step, {"train/loss": float(first + step)})
+        board.close()
+    events = accumulator.EventAccumulator(str(tmp_path / "tensorboard")).Reload()
+    assert [(event.step, event.value) for event in events.Scalars("train/loss")] == [(2, 2), (4, 4), (6, 10)]
+
+
 def test_logs_that_cannot_be_written_are_one_line(tmp_path: Path) -> None:
     pytest.importorskip("tensorboard")
     (tmp_path / "tensorboard").touch()

@@ -15,7 +15,10 @@ BOARD_FOLDER = "tensorboard"
 
 
 class Board:
-    """Writes scalars into RUN/tensorboard, or nothing where `wanted` is False or there is no tensorboard."""
+    """Writes scalars into RUN/tensorboard, or nothing where `wanted` is False or there is no tensorboard.
+
+    step: of the checkpoint that the run goes on from, whose own figures stay; 0 where it starts.
+    """
 
     def __init__(self, run_dir: Path, step: int, *, wanted: bool) -> None:
         self._writer: Any = None
@@ -25,7 +28,7 @@ class Board:
             except ImportError:
                 return
             try:
-                self._writer = SummaryWriter(str(run_dir / BOARD_FOLDER), purge_step=step or None)
+                self._writer = SummaryWriter(str(run_dir / BOARD_FOLDER), purge_step=step + 1)
             except OSError as error:
                 raise FsidError(
                     f"{run_dir / BOARD_FOLDER}: cannot be written ({error.strerror}); "
