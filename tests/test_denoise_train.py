@@ -38,7 +38,7 @@ from fsid.denoise import (  # noqa: E402
     train,
 )
 from fsid.denoise.board import Board  # noqa: E402
-from fsid.denoise.checkpoint import load_checkpoint  # noqa: E402
+from fsid.denoise.checkpoint import TrainState, load_checkpoint  # noqa: E402
 from fsid.denoise.raw_denoiser import RawDenoiser  # noqa: E402
 from fsid.denoise.stabilise import stabilise, unstabilise  # noqa: E402
 from fsid.denoise.train import _prepare, _step, learning_rate, noise_left  # noqa: E402
@@ -532,6 +532,20 @@ def test_fine_tuning_refuses_a_network_of_another_size(data: Path, tmp_path: Pat
     with pytest.raises(FsidError, match="nowhere"):
         train(data, tmp_path / "run", replace(CONFIG, initial_weights="nowhere"), quiet=True)
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(("decay", "left"), [(0.999, 24 / 17160), (0.15, 0.1 * 0.15**3)])
+def test_the_average_of_the_weights_forgets_its_start(decay: float, left: float) -> None:
+    """Weights that jump from 0 to 1: four steps miss the product of their decays, 1/10 2/11 3/12 4/13."""
+    net = torch.nn.Linear(1, 1)
+    with torch.no_grad():
+        net.weight.fill_(0.0)
+        state = TrainState.start(net)
+        net.weight.fill_(1.0)
+    for _ in range(4):
+        state.advance(net, decay)
+    assert state.step == 4
+    assert 1 - state.average["weight"].item() == pytest.approx(left, rel=1e-4)
 
 
 def test_learning_rate_rises_and_falls() -> None:
