@@ -303,6 +303,15 @@ def test_what_spoils_a_burst_is_named(clean: Raw, tmp_path: Path, light: list[fl
     assert "tripod" not in str(caught.value)
 
 
+def test_a_scene_that_no_test_set_can_have_is_refused_before_the_work(clean: Raw, tmp_path: Path):
+    for scene in ("all", "star"):
+        _burst(tmp_path / "captures" / scene / "1lux", clean)
+    done: list[int] = []
+    with pytest.raises(FsidError, match="all: means all sets together"):
+        burst_testset(tmp_path / "captures", tmp_path / "set", progress=lambda n, total: done.append(n))
+    assert not done
+
+
 @pytest.mark.parametrize("missing", ["frames", "level", "all"])
 def test_what_is_missing_is_named(clean: Raw, tmp_path: Path, missing: str, capsys):
     captures = tmp_path / "captures"

@@ -90,6 +90,8 @@ def burst_testset(
             raise FsidError(f"{captures / scene}: has no burst {missing[0]}; every scene needs every level")
     qualities = []
     name = load_profile(camera).name if camera else ""
+    images = tuple(TestImage(scene, scene) for scene in scenes)
+    testset = TestSet(name, levels, images, 0, "captured bursts, truth by robust averaging", frames)
     with staged(out) as root:
         for done, ((scene, level), paths) in enumerate(bursts.items()):
             progress(done, len(bursts))
@@ -105,8 +107,7 @@ def burst_testset(
                 write_dng(target, exact_levels(replace(raw, noise=_noise(raw, camera, path))))
             qualities.append(quality)
         progress(len(bursts), len(bursts))
-        images = tuple(TestImage(scene, scene) for scene in scenes)
-        testset = TestSet(name, levels, images, 0, "captured bursts, truth by robust averaging", frames)
+        testset = replace(testset, camera=name)
         write_testset(root, testset)
         write_atomically(root / "truth.csv", _csv(qualities).encode())
     return testset, qualities
