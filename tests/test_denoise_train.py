@@ -227,7 +227,7 @@ def test_what_a_run_holds_out_stays_so_when_its_dataset_grows(
     monkeypatch.setattr(Validation, "measure", lambda self, weights: {"psnr_scenes": next(scores)})
     folder, run, rng = tmp_path / "data", tmp_path / "run", np.random.default_rng(3)
     folder.mkdir()
-    samples = [stored(rng, number) for number in range(9)]
+    samples = [stored(rng, number) for number in range(10)]
     write_shard(shard_path(folder, 0), samples[:5])
     save_settings(DatasetConfig(0, 5, GenerateConfig(), pictures=5), folder / "config.yaml")
     config = replace(CONFIG, held_out=1, validate_every=4)
@@ -240,8 +240,8 @@ def test_what_a_run_holds_out_stays_so_when_its_dataset_grows(
     write_shard(shard_path(folder, 1), samples[5:])
     train(folder, run, config, quiet=True)
     last, best = (load_denoiser(run / name).card for name in ("last.safetensors", "model.safetensors"))
-    assert last.training.startswith(f"{7 if is_older else 8} images")
-    row = {"step": 8, "held_out": 1, "held_out_from": 8 if is_older else 4, "psnr_scenes": 40.0}
+    assert last.training.startswith("8 images")
+    row = {"step": 8, "held_out": 1, "held_out_from": 9 if is_older else 4, "psnr_scenes": 40.0}
     assert last.details["validation"] == [row]
     assert best.details["validation"][0]["psnr_scenes"] == (40.0 if is_older else 50.0)
 
@@ -307,6 +307,21 @@ def test_progress_replaces_the_live_line_and_quiet_is_silent(
     shown = "".join(capfd.readouterr())
     assert "8/8" in shown
     assert "PSNR" not in shown
+
+
+@pytest.mark.parametrize(
+    ("images", "pictures", "wanted", "kept"),
+    [(40, 0, 8, 8), (12, 0, 8, 2), (40, 8, 8, 1), (50, 10, 8, 2), (40, 4, 8, 0), (4, 0, 8, 0), (40, 0, 0, 0)],
+)
+def test_held_out_pictures_are_at_most_a_fifth_of_the_data(
+    images: int, pictures: int, wanted: int, kept: int, tmp_path: Path
+) -> None:
+    """Also where each of a few pictures is there many times: eight photographs were all held out."""
+    sample = stored(np.random.default_rng(5), 0)[1]
+    write_shard(shard_path(tmp_path, 0), [(f"{number:08d}", sample) for number in range(images)])
+    save_settings(DatasetConfig(0, images, GenerateConfig(), pictures=pictures), tmp_path / "config.yaml")
+    found = held_out(tmp_path, replace(CONFIG, held_out=wanted))
+    assert [mosaic.key for mosaic in found] == [f"{number:08d}" for number in range(images - kept, images)]
 
 
 def test_a_training_that_validates_nothing_says_so(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

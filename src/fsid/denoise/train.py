@@ -277,8 +277,8 @@ def mean_psnr(estimate: Tensor, clean: Tensor) -> Tensor:
 
 
 def _note_nothing_held_out(data_dir: Path) -> None:
-    why = f"{data_dir}: none is held out for validation, which takes five images when a training begins"
-    line = f"note: {why}; {MODEL_FILE} is the network at the last step"
+    why = "none is held out for validation, which takes five scenes or pictures when a training begins"
+    line = f"note: {data_dir}: {why}; {MODEL_FILE} is the network at the last step"
     Console(stderr=True).print(Text(line), soft_wrap=True)
 
 

@@ -31,9 +31,10 @@ class TrainConfig:
     warmup_steps: linear rise. betas, weight_decay: of AdamW. clip_norm: largest gradient norm. ema_decay: of
     the moving average of the weights, which is the model that is kept. profiles: cameras whose noise is
     drawn, by name or file. iso_min, iso_max: log-uniform range. held_out: images at the end of the dataset,
-    as it is when the run begins, that are for validation, at most a fifth of it. validate_every: steps.
-    validation_photos: a folder of photographs to validate on as well ("" for none). seed: of weights, patches
-    and noise. log_every, checkpoint_every: steps. tensorboard: write its logs, where it is installed.
+    as it is when the run begins, that are for validation; with the others of their scenes at most a fifth of
+    it. validate_every: steps. validation_photos: a folder of photographs to validate on as well ("" for
+    none). seed: of weights, patches and noise. log_every, checkpoint_every: steps. tensorboard: write its
+    logs, where it is installed.
     compile: the network with torch.compile; auto does on a GPU. threads: of PyTorch on a CPU, 0 leaves its
     own choice. loader_processes: extra processes that prepare batches (0: none, right on a CPU).
     """

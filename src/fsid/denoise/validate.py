@@ -9,6 +9,7 @@ so that a network "trained on scenes alone" is not chosen by photographs either.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -70,11 +71,22 @@ class Validation:
 def held_out(
     data_dir: Path, config: TrainConfig, keys: Collection[str] | None = None
 ) -> tuple[StoredMosaic, ...]:
-    """The images of `data_dir` with these keys; None: its last `config.held_out`, at most a fifth of it."""
+    """The images of `data_dir` with these keys; None: its last `config.held_out`.
+
+    These are fewer where, with all other images of their scenes, they would be more than a fifth of it: a
+    dataset of few pictures has each of them many times.
+    """
     mosaics = index_mosaics(data_dir)
     if keys is not None:
         return tuple(mosaic for mosaic in mosaics if mosaic.key in keys)
-    return mosaics[len(mosaics) - min(config.held_out, len(mosaics) // 5) :]
+    of_scene = Counter(mosaic.scene for mosaic in mosaics)
+    left, kept = len(mosaics) // 5, []
+    for mosaic in mosaics[::-1][: config.held_out]:
+        left -= of_scene.pop(mosaic.scene, 0)  # all of a scene with the first of it
+        if left < 0:
+            break
+        kept.append(mosaic)
+    return tuple(kept[::-1])
 
 
 def validation(mosaics: Sequence[StoredMosaic], config: TrainConfig, device: torch.device) -> Validation:
