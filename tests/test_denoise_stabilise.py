@@ -64,6 +64,14 @@ def test_no_residual_is_the_identity_and_gradients_reach_it(kind: str) -> None:
     assert (residual.grad > 0).all()
 
 
+@pytest.mark.parametrize("kind", ["stabilise", "k-sigma", "noise-map"])
+def test_a_residual_is_in_units_of_the_noise(kind: str) -> None:
+    """Of the pixel, and with k-sigma of a grey at the anchor, in the middle of what is usual."""
+    x, k, sigma2 = full(0.1), full(ANCHOR_K), full(ANCHOR_SIGMA2)
+    left = clean_estimate(x, full(-1.0), k, sigma2, kind) - x
+    assert -left.mean().item() == pytest.approx((ANCHOR_K * 0.1 + ANCHOR_SIGMA2) ** 0.5, rel=0.05)
+
+
 def test_after_k_sigma_the_noise_depends_on_the_signal_alone(rng: np.random.Generator) -> None:
     """Two ISOs, signals that transform to one value: noise of one variance, that of the anchor there."""
     for value in (0.1, 0.4, 1.5):
