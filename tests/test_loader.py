@@ -18,6 +18,7 @@ import pytest
 torch = pytest.importorskip("torch")
 
 from fsid.config import save_settings  # noqa: E402
+from fsid.dataset.cells import Grid  # noqa: E402
 from fsid.dataset.config import DatasetConfig, GenerateConfig  # noqa: E402
 from fsid.dataset.feed import batches  # noqa: E402
 from fsid.dataset.index import index_mosaics  # noqa: E402
@@ -446,6 +447,16 @@ def test_an_epoch_has_every_patch_once_on_whatever_ranks(world: int, size: int, 
         patch for step in range(steps, 2 * steps) for rank in ranks for patch in pixels_of(rank[step])
     ]
     assert {patch.min() for patch in following[:total]} != {patch.min() for patch in epoch}
+
+
+def test_the_cells_start_elsewhere_in_every_epoch(dataset: Path) -> None:
+    """40 and 60 pixels hold two and four cells of 14: what is left, 12 and 4, is before them in any share."""
+    grid = Grid(index_mosaics(dataset), size_px=6)
+    starts = np.array([grid.cell(grid.patches * epoch, seed=1).corner for epoch in range(400)]) % grid.pitch
+    for axis, left in enumerate((HEIGHT % 14, WIDTH % 14)):
+        counts = np.bincount(starts[:, axis], minlength=left + 1)
+        assert len(counts) == left + 1
+        assert counts.min() > 0.4 * counts.mean()
 
 
 def test_every_length_is_permuted() -> None:
