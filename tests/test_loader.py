@@ -37,7 +37,7 @@ from fsid.sensor import (  # noqa: E402
     save_profile,
     write_dng,
 )
-from fsid.sensor.noise import level_rand  # noqa: E402
+from fsid.sensor.noise import K_JITTER, SIGMA2_JITTER, level_rand  # noqa: E402
 
 HEIGHT, WIDTH = 40, 60
 CONFIG = PatchConfig(size_px=16, batch=3, profiles=("pixel6", "galaxy-s22"), iso_min=400, iso_max=6400)
@@ -578,5 +578,10 @@ def test_the_table_of_levels_is_the_profile(rng: np.random.Generator) -> None:
             np.quantile(np.log(found), shares, axis=0), np.quantile(np.log(wanted), shares, axis=0), atol=0.2
         )
     calm = LevelTable([camera], (1000, 1000)).draw_rand(rng, count)
-    np.testing.assert_allclose(np.median(calm[1], axis=0), camera.level(1000).k, rtol=5e-3)
-    np.testing.assert_allclose(np.median(calm[2], axis=0), camera.level(1000).sigma2, rtol=1e-2)
+    level = camera.level(1000)
+    for found, wanted, jitter in ((calm[1], level.k, K_JITTER), (calm[2], level.sigma2, SIGMA2_JITTER)):
+        scatter = np.log(found / wanted)
+        np.testing.assert_allclose(np.median(scatter, axis=0), 0, atol=0.05 * jitter)
+        np.testing.assert_allclose(scatter.std(axis=0), jitter, rtol=0.03)
+        assert np.ptp(scatter, axis=1).max() < 1e-5  # of the unit, not of a site
+    assert abs(np.corrcoef(calm[1][:, 0], calm[2][:, 0])[0, 1]) < 0.03
