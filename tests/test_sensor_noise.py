@@ -141,6 +141,13 @@ def test_the_variance_of_stored_data_is_that_of_its_level(iso, x):
     assert noisy.noise == level
 
 
+def test_less_noise_than_rounding_makes_is_no_noise_before_it():
+    """As another unit's jitter may have it at low ISO; the negative rest would be refused as a variance."""
+    level = NoiseLevel(k=(1e-4,) * 4, sigma2=(0.5 / 12 / 959**2,) * 4)
+    noisy = noisy_from_clean(np.random.default_rng(0), _flat(0.1), 50, level)
+    assert (noisy.mosaic - 0.1).var() == pytest.approx(1e-5 + 1 / 12 / 959**2, rel=0.02)
+
+
 def test_clean_levels_round_64_times_finer():
     raw = _flat(0.123456, side=4)
     fine = clean_levels(raw)

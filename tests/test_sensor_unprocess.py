@@ -57,6 +57,15 @@ def test_highlights_never_get_darker_than_the_light_below_them():
     assert np.all(np.diff(camera, axis=1) >= -1e-6)
 
 
+def test_highlights_are_exposed_as_much_as_the_light_below_them():
+    """What is kept of a highlight is never less than its gain: where exposure lifts green, it lifts all."""
+    matrix, gains = published_matrices()[1], (2.2, 1.0, 1.7)
+    ramp = np.linspace(0, 1, 256, dtype=np.float32)[None, :, None] * np.ones((1, 1, 3), np.float32)
+    light = srgb_decode(inverse_tone_curve(ramp[..., 1]))
+    camera = unprocess(ramp, matrix, gains, exposure=1.05)
+    np.testing.assert_allclose(camera[..., 1], np.minimum(1.05 * light, 1), atol=1e-5)
+
+
 @settings(max_examples=40, deadline=None)
 @given(seeds)
 def test_the_path_of_rendered_light_is_exactly_linear(seed):
