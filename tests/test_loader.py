@@ -585,3 +585,5 @@ def test_the_table_of_levels_is_the_profile(rng: np.random.Generator) -> None:
         np.testing.assert_allclose(scatter.std(axis=0), jitter, rtol=0.03)
         assert np.ptp(scatter, axis=1).max() < 1e-5  # of the unit, not of a site
     assert abs(np.corrcoef(calm[1][:, 0], calm[2][:, 0])[0, 1]) < 0.03
+    dark = LevelTable([camera, load_profile("galaxy-s22")], (50, 100)).draw_rand(rng, count)
+    assert dark[2][dark[0] == 0].min() * camera.span**2 == pytest.approx(1 / 12)  # rounding

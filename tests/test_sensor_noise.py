@@ -172,6 +172,13 @@ def test_level_rand_is_log_uniform_in_iso_and_scatters_around_the_profile():
     assert abs(np.corrcoef(k_factor, sigma2_factor)[0, 1]) < 0.15
 
 
+def test_no_unit_of_a_camera_is_without_rounding():
+    """At low ISO a fifth less than sigma2 would be less than integers have, and the level no variance."""
+    profile, rng = load_profile("pixel6"), np.random.default_rng(0)
+    lowest = min(min(level_rand(rng, profile, (50, 100))[1].sigma2) for _ in range(200))
+    assert lowest * profile.span**2 == pytest.approx(1 / 12)
+
+
 @pytest.mark.parametrize("iso_range", [(0, 100), (800, 400), (-5, 5)])
 def test_level_rand_refuses_a_range_without_iso(iso_range):
     with pytest.raises(FsidError, match="iso_range"):

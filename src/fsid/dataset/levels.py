@@ -16,6 +16,7 @@ import numpy as np
 from fsid.errors import FsidError
 from fsid.sensor.noise import K_JITTER, SIGMA2_JITTER
 from fsid.sensor.profiles import CameraProfile
+from fsid.sensor.quantise import ROUNDING_DN2
 
 _STEPS = 512
 
@@ -30,6 +31,7 @@ class LevelTable:
         iso = np.geomspace(low, high, _STEPS + 1)
         levels = [[camera.level(value) for value in iso] for camera in cameras]
         self._log = np.log([[(level.k, level.sigma2) for level in curve] for curve in levels])
+        self._floor = np.array([[ROUNDING_DN2 / camera.span**2] for camera in cameras], np.float32)
 
     def draw_rand(self, rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """`count` levels, jittered as by `level_rand`: camera (count,), k and sigma2 (count, 4) float32."""
@@ -40,4 +42,4 @@ class LevelTable:
         before, after = self._log[camera, step], self._log[camera, step + 1]
         jitter = rng.normal(0.0, (K_JITTER, SIGMA2_JITTER), (count, 2))[..., None]
         levels = np.exp(before + share * (after - before) + jitter).astype(np.float32)
-        return camera, levels[:, 0], levels[:, 1]
+        return camera, levels[:, 0], np.maximum(levels[:, 1], self._floor[camera])

@@ -78,17 +78,17 @@ def level_rand(
     """Draw (ISO, level): ISO log-uniform over `iso_range`, then the profile's level with jitter.
 
     The jitter is one log-normal factor on k (relative sigma `K_JITTER`) and one on sigma2
-    (`SIGMA2_JITTER`), common to all sites: another unit of the same camera at another temperature.
+    (`SIGMA2_JITTER`), common to all sites: another unit of the same camera at another temperature. sigma2
+    stays at or above the rounding noise, which no unit is without.
     """
     low, high = iso_range
     if not 0 < low <= high:
         raise FsidError(f"iso_range ({low}, {high}): give two ISO values, 0 < low <= high")
     iso = float(np.exp(rng.uniform(np.log(low), np.log(high))))
     k_factor, sigma2_factor = np.exp(rng.normal(0.0, (K_JITTER, SIGMA2_JITTER)))
-    level = profile.level(iso)
-    return iso, NoiseLevel(
-        k=_scaled(level.k, float(k_factor)), sigma2=_scaled(level.sigma2, float(sigma2_factor))
-    )
+    level, floor = profile.level(iso), ROUNDING_DN2 / profile.span**2
+    r, gr, gb, b = (max(value, floor) for value in _scaled(level.sigma2, float(sigma2_factor)))
+    return iso, NoiseLevel(k=_scaled(level.k, float(k_factor)), sigma2=(r, gr, gb, b))
 
 
 def _rows(level: NoiseLevel, cfa: str, width: int) -> tuple[np.ndarray, np.ndarray]:
