@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from fsid.cli.main import main
-from fsid.evaluate import read_testset
+from fsid.evaluate import read_testset, simulated_testset
 from fsid.evaluate.testbench import MATERIALS, simulate
 from fsid.evaluate.testbench.prints import _screen
 from fsid.evaluate.testbench.surface import light_rand, sheet
-from fsid.sensor import light_level, load_profile, read_raw
+from fsid.sensor import light_level, load_profile, pack, read_raw
+from fsid.sensor.light import GREY, KEY
 
 
 @pytest.mark.parametrize("material", MATERIALS)
@@ -57,6 +58,18 @@ def test_the_command_makes_ten_materials_at_light_levels_in_lux(tmp_path: Path):
     assert frames[0].iso == pytest.approx(expected, rel=0.01)
     bright = read_raw(testset.noisy(out, image, "5lux"))
     assert np.var(frames[0].mosaic - truth.mosaic) > 3 * np.var(bright.mosaic - truth.mosaic)
+
+
+def test_the_truth_is_exposed_as_the_cameras_meter_would(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """A grey card of 18 % comes to KEY of saturation in green, as the electrons of a level in lux assume."""
+    monkeypatch.setattr(
+        "fsid.evaluate.simulated.simulate",
+        lambda rng, material, height, width: np.full((height, width, 3), GREY, np.float32),
+    )
+    size = {"scenes": 1, "width": 64, "height": 64}
+    made = simulated_testset(tmp_path / "set", camera="pixel6", luxes=[5.0], materials=["text"], **size)
+    truth = read_raw(made.clean(tmp_path / "set", made.images[0]))
+    np.testing.assert_allclose(pack(truth.mosaic, truth.cfa)[1:3], KEY, rtol=1e-3)
 
 
 @pytest.mark.parametrize(
