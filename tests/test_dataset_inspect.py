@@ -12,11 +12,12 @@ from skimage.color import lab2rgb
 
 from fsid.cli.main import main
 from fsid.dataset import find_photos, find_pictures
-from fsid.dataset.inspect import inspect
+from fsid.dataset.inspect import _picture, inspect
 from fsid.dataset.shards import shard_path, write_shard
 from fsid.dataset.statistics import TITLES, compare, distance, measure, pool, spectrum_slope
 from fsid.errors import FsidError
 from fsid.sensor import Raw, write_dng
+from fsid.sensor.colour import published_matrices
 
 
 def _noise(slope: float, size: int = 256, seed: int = 0) -> np.ndarray:
@@ -64,6 +65,26 @@ def test_orientation_tells_stripes_from_each_other():
     stripes = _grey((np.arange(128) // 8 % 2 * 0.5 + 0.25)[:, None] + np.zeros((1, 128), np.float32))
     assert np.median(measure(stripes)["orientation"]) > 85
     assert np.median(measure(stripes.swapaxes(0, 1))["orientation"]) < 5
+
+
+def test_orientation_is_that_of_contrast_and_not_of_area():
+    """Strong stripes in a quarter of the picture, across faint ones everywhere."""
+    faint = (np.arange(128) // 8 % 2 * 0.01 + 0.25)[:, None] + np.zeros((1, 128))
+    faint[:, :32] += np.arange(32) // 8 % 2 * 0.5
+    assert np.median(measure(_grey(faint))["orientation"]) < 5
+
+
+def test_colourfulness_is_that_of_hasler_and_suesstrunk():
+    """Half of it (0.8, 0.4, 0.2), half (0.2, 0.5, 0.6): R - G is 0.4 and -0.3, (R + G) / 2 - B 0.4, -0.25."""
+    image = np.full((32, 32, 3), (0.8, 0.4, 0.2), np.float32)
+    image[16:] = (0.2, 0.5, 0.6)
+    expected = np.hypot(0.35, 0.325) + 0.3 * np.hypot(0.05, 0.075)
+    assert measure(image)["colourfulness"] == pytest.approx(expected, rel=1e-5)
+
+
+def test_a_saturated_mosaic_is_white_whatever_its_white_balance():
+    matrix = published_matrices()[0]
+    np.testing.assert_allclose(_picture(np.ones((4, 4)), "RGGB", (2.0, 1.0, 1.6), matrix), 1, atol=1e-5)
 
 
 def test_more_colours_give_more_entropy_and_coverage():

@@ -35,6 +35,14 @@ def ramp(height: int = 256, width: int = 256) -> np.ndarray:
     return np.tile(np.linspace(0.0, 0.8, width), (height, 1))
 
 
+def test_pools_that_texture_lifts_count_less_than_those_below():
+    mean = np.linspace(0.02, 0.8, 24)
+    variance = 1e-3 * mean + 1e-5
+    variance[[5, 11, 12, 20]] *= 1.5
+    line, _ = _line(_Pools(mean, variance, np.full(24, 2000.0)), 1e-8)
+    np.testing.assert_allclose(line @ (mean, np.ones(24)), 1e-3 * mean + 1e-5, rtol=0.02)
+
+
 @pytest.mark.parametrize(("name", "iso"), [("coffee", 1600), ("coffee", 6400), ("astronaut", 3200)])
 def test_the_noise_of_a_photo_is_found(name, iso, rng):
     clean, level = clean_from_photo(rng, photo(name), PROFILE), PROFILE.level(iso)

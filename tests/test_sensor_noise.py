@@ -51,9 +51,10 @@ def test_variance_law_holds_at_every_site(cfa, x):
     [
         NoiseLevel((0.001,) * 4, (-1e-5,) * 4),
         NoiseLevel((np.nan,) * 4, (1e-5,) * 4),
+        NoiseLevel((np.inf,) * 4, (1e-5,) * 4),
         NoiseLevel((0.001,) * 3, (1e-5,) * 3),
     ],
-    ids=["negative", "NaN", "three sites"],
+    ids=["negative", "NaN", "infinite", "three sites"],
 )
 def test_a_level_that_is_none_is_refused(level):
     """Negative variances made images of NaN, or counted as none."""
