@@ -119,6 +119,11 @@ def test_flaws_are_found(rng: np.random.Generator) -> None:
         assert flaw(clean(y), checks) == name
         y[:, 4:8] = 0.5
         assert flaw(clean(y), checks) is None
+    for wrong, places in ((None, ((0, 0), (1, 1))), ("blown", ((0, 1), (1, 0)))):  # red and blue, both greens
+        y = x.copy()
+        for row, column in places:
+            y[row::2, column::2] = 1.0
+        assert flaw(clean(y), checks) == wrong
     for name, value in (("not finite", np.nan), ("out of range", 1.01), ("out of range", -0.01)):
         y = x.copy()
         y[3, 3] = value
