@@ -15,7 +15,7 @@ from fsid.errors import FsidError
 from fsid.evaluate import NOISY, burst_testset, compare, psnr, read_testset, simulated_testset
 from fsid.evaluate.bursts import average
 from fsid.evaluate.placing import shift_between
-from fsid.sensor import NoiseTerms, Raw, load_profile, noisy_from_clean, read_raw, write_dng
+from fsid.sensor import NoiseLevel, NoiseTerms, Raw, load_profile, noisy_from_clean, read_raw, write_dng
 from fsid.sensor.metadata import ORIENTATION, Metadata
 from fsid.sensor.tiff import SHORT, Tag
 from stated_black import state_black
@@ -216,6 +216,27 @@ def test_a_frame_whose_noise_nothing_tells_is_named(clean: Raw, tmp_path: Path, 
         write_dng(path, replace(read_raw(path), noise=None))
     with pytest.raises(FsidError, match=r"star/1lux/000\.dng: no smooth part; --camera names a profile"):
         burst_testset(tmp_path / "captures", tmp_path / "out")
+
+
+def test_a_noise_profile_that_states_nothing_is_none(clean: Raw, tmp_path: Path):
+    paths = _burst(tmp_path / "captures/star/1lux", clean)
+    raws = [read_raw(path) for path in paths]
+    for value, iso in ((0.0, 1600), (-1e-6, 0)):
+        for path, raw in zip(paths, raws, strict=True):
+            noise = NoiseLevel((value,) * 4, (value,) * 4)
+            write_dng(path, replace(raw, iso=iso, noise=noise, metadata=Metadata()))
+        if value == 0:
+            testset, _ = burst_testset(tmp_path / "captures", tmp_path / "zeros")
+            found = read_raw(testset.noisy(tmp_path / "zeros", testset.images[0], "1lux")).noise
+            assert found is not None
+            assert 0.5 < found.k[1] / PROFILE.level(1600).k[1] < 2
+    with pytest.raises(
+        FsidError, match=r"000\.dng: its NoiseProfile holds a variance below 0; --camera names"
+    ):
+        burst_testset(tmp_path / "captures", tmp_path / "below")
+    with pytest.raises(FsidError, match=r"000\.dng: its ISO is unknown; --camera pixel6 needs"):
+        burst_testset(tmp_path / "captures", tmp_path / "no-iso", camera="pixel6")
+    assert not (tmp_path / "below").exists()
 
 
 def test_hidden_files_and_pictures_beside_the_raws_are_no_frames(clean: Raw, tmp_path: Path):

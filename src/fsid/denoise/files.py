@@ -25,6 +25,7 @@ from fsid.sensor import (
     write_dng,
 )
 from fsid.sensor.bare import BARE_SUFFIXES, HEADERLESS_SUFFIXES
+from fsid.sensor.blind import stated_noise
 
 RAW_SUFFIXES = frozenset(
     """.3fr .arw .cr2 .cr3 .crw .dcr .dng .erf .fff .iiq .k25 .kdc .mef .mos .mrw .nef .nrw .orf .pef .raf
@@ -110,10 +111,7 @@ def _check_iso(profile: str | None, iso: float | None) -> None:
 
 
 def noise_of(raw: Raw, profile: str | None, iso: float | None, path: Path) -> Noise:
-    """The level of a profile at an ISO (by default the file's), else the file's own, else the image's.
-
-    A NoiseProfile of zeros is none: cameras and converters write it where they know no better.
-    """
+    """The level of a profile at an ISO (by default the file's), else the file's own, else the image's."""
     _check_iso(profile, iso)
     if profile is not None:
         iso = iso if iso is not None else raw.iso
@@ -121,11 +119,12 @@ def noise_of(raw: Raw, profile: str | None, iso: float | None, path: Path) -> No
             raise FsidError(f"{path}: its ISO is unknown, give --iso")
         return Noise(load_bayer_profile(profile).level(iso), f"profile {profile} at ISO {iso:g}")
     advice = "give --profile NAME --iso N (fsid profiles lists them)"
-    stated = () if raw.noise is None else (*raw.noise.k, *raw.noise.sigma2)
-    if raw.noise is not None and any(stated):
-        if min(stated) < 0:
-            raise FsidError(f"{path}: its NoiseProfile holds a variance below 0; {advice}")
-        return Noise(raw.noise, "the file's NoiseProfile")
+    try:
+        stated = stated_noise(raw)
+    except FsidError as error:
+        raise FsidError(f"{path}: {error}; {advice}") from None
+    if stated is not None:
+        return Noise(stated, "the file's NoiseProfile")
     lack = "holds no NoiseProfile" if raw.noise is None else "its NoiseProfile states no noise at all"
     try:
         level = estimate_noise(raw).level

@@ -37,6 +37,7 @@ from fsid.sensor import (
     read_raw,
     write_dng,
 )
+from fsid.sensor.blind import stated_noise
 
 OUTLIER_SIGMA = 4.0
 MAX_NOISY_FLICKER = 0.01
@@ -243,11 +244,11 @@ def _spread_over_site(variance: np.ndarray) -> np.ndarray:
 
 def _noise(raw: Raw, camera: str | Path, path: Path) -> NoiseLevel:
     if camera:
+        if not raw.iso > 0:
+            raise FsidError(f"{path}: its ISO is unknown; --camera {camera} needs files that state it")
         return load_profile(camera).level(raw.iso)
-    if raw.noise is not None:
-        return raw.noise
     try:
-        return estimate_noise(raw).level
+        return stated_noise(raw) or estimate_noise(raw).level
     except FsidError as error:
         raise FsidError(f"{path}: {error}; --camera names a profile of its noise") from None
 

@@ -53,6 +53,17 @@ class NoiseEstimate:
     sigma2_error: tuple[float, float, float, float]
 
 
+def stated_noise(raw: Raw) -> NoiseLevel | None:
+    """The noise that a file states; None where it states none, or zeros, which cameras and converters write
+    where they know no better. FsidError: a variance below 0."""
+    stated = () if raw.noise is None else (*raw.noise.k, *raw.noise.sigma2)
+    if not any(stated):
+        return None
+    if min(stated) < 0:
+        raise FsidError("its NoiseProfile holds a variance below 0")
+    return raw.noise
+
+
 @dataclass(frozen=True, eq=False)
 class _Blocks:
     """Blocks of one site: mean, energy of low frequencies and of high ones, each per coefficient.
