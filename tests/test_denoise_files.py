@@ -262,6 +262,20 @@ def test_an_unreadable_file_is_left_out_of_a_folder(
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["b.dng"]
 
 
+def test_what_is_said_of_files_does_not_depend_on_a_broken_one(
+    tmp_path: Path, network: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder := tmp_path / "in").mkdir()
+    write_dng(folder / "a.dng", replace(noisy_raw(), noise=None))
+    write_dng(folder / "b.dng", replace(noisy_raw(), noise=NoiseLevel((0.03,) * 4, (0.001,) * 4)))
+    (folder / "c.dng").write_bytes((folder / "a.dng").read_bytes()[:5000])
+    with pytest.raises(SystemExit):
+        main(["denoise", str(folder), str(tmp_path / "out"), "--model", str(network)])
+    said = capsys.readouterr().err
+    assert f"the noise of 1 of 2 files, the first one {folder / 'a.dng'}, is estimated" in said
+    assert f"{folder / 'b.dng'}: more noise than networks keep" in said
+
+
 def test_a_picture_keeps_its_own_iso(noisy_file: Path, network: Path) -> None:
     out = noisy_file.parent / "out.dng"
     own = read_raw(noisy_file).iso

@@ -83,20 +83,26 @@ def denoise(
     if sources is not None:
         if not quiet:
             _note_left_out(input, output, bare=layout is not None)
-        with progress_bar("denoising", "files", quiet=quiet) as progress:
-            noises = denoise_folder(
-                sources,
-                output,
-                network,
-                profile=profile,
-                iso=iso,
-                strength=strength,
-                layout=layout,
-                progress=progress,
-                failed=lambda error: console.print(Text(f"fsid: {error}", style="bold red"), soft_wrap=True),
-            )
-        _note_guessed(noises, quiet=quiet)
-        _note_strong(noises, quiet=quiet)
+        noises: dict[Path, Noise] = {}
+        try:
+            with progress_bar("denoising", "files", quiet=quiet) as progress:
+                denoise_folder(
+                    sources,
+                    output,
+                    network,
+                    profile=profile,
+                    iso=iso,
+                    strength=strength,
+                    layout=layout,
+                    progress=progress,
+                    denoised=noises.__setitem__,
+                    failed=lambda error: console.print(
+                        Text(f"fsid: {error}", style="bold red"), soft_wrap=True
+                    ),
+                )
+        finally:  # what is to be said of those that are done does not depend on the others
+            _note_guessed(noises, quiet=quiet)
+            _note_strong(noises, quiet=quiet)
         return
     with progress_bar("denoising", "tiles", quiet=quiet) as progress:
         noise = denoise_file(

@@ -184,12 +184,14 @@ def denoise_folder(
     strength: float = 1.0,
     layout: Layout | None = None,
     progress: Callable[[int, int], None] | None = None,
+    denoised: Callable[[Path, Noise], None] = lambda source, noise: None,
     failed: Callable[[FsidError], None] = lambda error: None,
 ) -> dict[Path, Noise]:
     """Denoise each of `sources` into a DNG of its name in the folder `target`, which is made.
 
-    The noise level that was used for each is returned. failed: told of each file that cannot be denoised;
-    FsidError says in the end how many they were. What is wrong with all of them `check_options` tells before.
+    The noise level that was used for each is returned. denoised: told of each that is done. failed: told of
+    each file that cannot be denoised; FsidError says in the end how many they were. What is wrong with all of
+    them `check_options` tells before.
     """
     target, paths = Path(target), list(map(Path, sources))
     names = [path.stem for path in paths]
@@ -211,6 +213,8 @@ def denoise_folder(
             )
         except FsidError as error:
             failed(error)
+        else:
+            denoised(source, noises[source])
         if progress is not None:
             progress(done + 1, len(paths))
     if failures := len(paths) - len(noises):
