@@ -304,6 +304,28 @@ def test_a_black_level_that_dark_frames_miss_is_noted(tmp_path, rng):
         assert any(f"--black-level is {stated}" in note for note in found.notes) == is_noted
 
 
+def test_a_line_that_means_little_is_said(tmp_path, rng):
+    """Of a black level that is too low, of compressed DN, of a read noise that no dark frame shows."""
+
+    def notes(folder: str, images: list[np.ndarray], black: int = 64, dark: int = 0) -> str:
+        paths = write_arrays(tmp_path / folder, images)
+        layout = replace(LAYOUT, iso=800, black_level=black)
+        return " ".join(calibrate(paths, name="x", dark=paths_dark[:dark], layout=layout).notes)
+
+    covered = [to_dn(raw) for raw in exposures(rng, scene(0.0), 800, 6)]
+    paths_dark = write_arrays(tmp_path / "dark", covered)
+    lit = [to_dn(raw) for raw in exposures(rng, scene(), 800, 20)]
+    bent = [np.interp(dn, [0, 200, 400, 1023], [0, 200, 300, 400]).astype(np.uint16) for dn in lit]
+    assert not notes("lit", lit, dark=6)
+    assert not notes("lit", lit)
+    assert "black level is at least 1" in notes("lit", lit, black=44)
+    assert "no straight line in light (off by " in notes("bent", bent, dark=6)
+    bright = replace(scene(), mosaic=0.3 + 0.3 * scene().mosaic)
+    images = [to_dn(raw) for raw in exposures(rng, bright, 800, 6)]
+    assert "sigma2 is uncertain by " in notes("bright", images)
+    assert "sigma2 is uncertain by " not in notes("bright", images, dark=6)
+
+
 def test_sites_of_other_black_levels_are_measured_stated_and_kept(tmp_path, rng):
     """k and sigma2 are those of the camera with and without dark frames; the profile has the true levels."""
     above = np.zeros((SIDE, SIDE), np.uint16)

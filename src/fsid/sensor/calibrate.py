@@ -45,6 +45,8 @@ _POOL_PIXELS = 200  # at least, but for the last one
 _GUIDES = 64  # parts of the pixels that tell how noise depends on light before there are pools
 _MIN_POOL_PIXELS = 50
 _REWEIGHTINGS = 10
+_CROOKED = 4.0  # times the squared scatter of pools around a straight line
+_SURE = 4.0  # standard errors
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +61,11 @@ class Samples:
     variance: np.ndarray
     freedom: np.ndarray
     used: np.ndarray
+
+    def in_use(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """signal, variance and freedom of the pools that the fit takes."""
+        signal, variance, freedom = (v[self.used] for v in (self.signal, self.variance, self.freedom))
+        return signal, variance, freedom
 
     @staticmethod
     def joined(parts: Sequence[Samples]) -> Samples:
@@ -151,6 +158,36 @@ def fit_samples(
     return NoiseFit(k, sigma2, k_error, sigma2_error, black, tuple(sites))
 
 
+def departure(fit: NoiseFit) -> float:
+    """How far the pools lie from their line, relative, rms, beyond their own uncertainty: of the worst site.
+
+    0 where that may be chance: below `_CROOKED` times the scatter that they should have.
+    """
+    return max(_departure(*site) for site in zip(fit.samples, fit.k_dn, fit.sigma2_dn, strict=True))
+
+
+def black_too_low_dn(fit: NoiseFit) -> float:
+    """DN by which the black level is too low at least, as a line shows that would need less noise than none
+    at zero light: of the worst site. 0 where that may be chance."""
+    return max(_too_low_dn(*site) for site in zip(fit.samples, fit.k_dn, fit.sigma2_dn, strict=True))
+
+
+def _departure(samples: Samples, k: float, sigma2: float) -> float:
+    signal, variance, freedom = samples.in_use()
+    away2 = (variance / np.maximum(k * signal + sigma2, 1e-3) - 1) ** 2
+    if (away2 * freedom / 2).sum() < _CROOKED * max(len(signal) - 2, 1):
+        return 0.0
+    return float(np.sqrt(max(away2.mean() - (2 / np.maximum(freedom, 1e-9)).mean(), 0.0)))
+
+
+def _too_low_dn(samples: Samples, k: float, sigma2: float) -> float:
+    signal, variance, freedom = samples.in_use()
+    weight = freedom / (2 * np.maximum(k * signal + sigma2, 1e-3) ** 2)
+    slope, intercept, error = _weighted_line(signal, variance, weight)
+    missing = ROUNDING_DN2 - intercept
+    return missing / slope if slope > 0 and missing > _SURE * error[1] else 0.0
+
+
 def _pool(mean: np.ndarray, variance: np.ndarray, frames: int, black: float, white: int) -> Samples:
     order = np.argsort(mean)
     signal, variance = mean[order] - black, variance[order]
@@ -229,21 +266,29 @@ def _largest(frames: int) -> float:
 
 def _line(samples: Samples) -> tuple[float, float, float, float]:
     """k, sigma2 and their standard errors; sigma2 is not below the rounding noise."""
-    signal, variance, freedom = (v[samples.used] for v in (samples.signal, samples.variance, samples.freedom))
+    signal, variance, freedom = samples.in_use()
     if len(signal) < 2 or np.ptp(signal) <= 0:
         raise FsidError(
             "calibration found fewer than two light levels; add an exposure, a gradient or dark frames"
         )
-    design = np.stack([signal, np.ones_like(signal)], axis=1)
     model = variance
     for _ in range(_REWEIGHTINGS):
         weight = freedom / (2 * np.maximum(model, 1e-3) ** 2)
-        normal = design.T @ (design * weight[:, None])
-        k, sigma2 = np.linalg.solve(normal, design.T @ (variance * weight))
+        k, sigma2, error = _weighted_line(signal, variance, weight)
         if sigma2 < ROUNDING_DN2:
             sigma2 = ROUNDING_DN2
-            k = (weight * signal * (variance - sigma2)).sum() / normal[0, 0]
-        model = design @ (k, sigma2)
+            k = float((weight * signal * (variance - sigma2)).sum() / (weight * signal**2).sum())
+        model = k * signal + sigma2
     scatter = float((weight * (variance - model) ** 2).sum() / max(len(signal) - 2, 1))
-    k_error, sigma2_error = np.sqrt(np.diag(np.linalg.inv(normal)) * max(scatter, 1.0))
-    return float(k), float(sigma2), float(k_error), float(sigma2_error)
+    k_error, sigma2_error = error * np.sqrt(max(scatter, 1.0))
+    return k, sigma2, float(k_error), float(sigma2_error)
+
+
+def _weighted_line(
+    signal: np.ndarray, variance: np.ndarray, weight: np.ndarray
+) -> tuple[float, float, np.ndarray]:
+    """Slope, intercept, and the (2,) standard errors of both, of weights that are inverse variances."""
+    design = np.stack([signal, np.ones_like(signal)], axis=1)
+    normal = design.T @ (design * weight[:, None])
+    slope, intercept = np.linalg.solve(normal, design.T @ (variance * weight))
+    return float(slope), float(intercept), np.sqrt(np.diag(np.linalg.inv(normal)))

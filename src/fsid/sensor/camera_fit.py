@@ -18,7 +18,15 @@ from pathlib import Path
 import numpy as np
 
 from fsid.errors import FsidError
-from fsid.sensor.calibrate import NoiseFit, Samples, fit_samples, pool, pool_dark
+from fsid.sensor.calibrate import (
+    NoiseFit,
+    Samples,
+    black_too_low_dn,
+    departure,
+    fit_samples,
+    pool,
+    pool_dark,
+)
 from fsid.sensor.camera_profile import CameraProfile
 from fsid.sensor.fitted_profile import profile_of
 from fsid.sensor.frames import Frame, FrameSet, Layout, bursts, find_frames
@@ -33,6 +41,8 @@ BLACK_NOTED_DN = 1.0  # from which on it is noted, and from their own noise on
 SITES_APART_DN = 0.5  # from which on one black level for all sites leaves a cast in the dark
 BELOW_BLACK = 0.01  # of the pixels that may have a mean as far below the black level
 UNCERTAIN = 0.02  # relative standard error of k that deserves a note
+SIGMA2_UNCERTAIN = 0.2  # of sigma2, which hardly shows in bright pictures
+CROOKED = 0.05  # relative departure of the samples from their line that does
 
 Progress = Callable[[int, int], None]
 _Pooled = tuple[Samples, ...]
@@ -268,5 +278,25 @@ def _notes(reader: _Reader, isos: Sequence[float], fits: Sequence[NoiseFit]) -> 
     for iso in sorted(set(reader.cut_off)):
         yield f"ISO {iso:g}: dark noise reaches DN 0 and is cut off; corrected as far as it is Gaussian"
     for iso, fit in zip(isos, fits, strict=True):
-        if (error := float(np.max(fit.k_dn_error / fit.k_dn))) > UNCERTAIN:
-            yield f"ISO {iso:g}: k is uncertain by {100 * error:.1f} %; take more frames"
+        if (low_dn := black_too_low_dn(fit)) > 0:
+            yield (
+                f"ISO {iso:g}: noise falls to nothing before light does: the black level is at least "
+                f"{low_dn:.2g} DN too low, and sigma2 unknown; give --dark frames or the right level"
+            )
+        elif (off := departure(fit)) > CROOKED:
+            yield (
+                f"ISO {iso:g}: noise is no straight line in light (off by {100 * off:.0f} %, see --plot), so "
+                f"k and sigma2 mean little; are DN compressed, is the white level too high, are ISOs mixed?"
+            )
+        else:
+            k_error, sigma2_error = (
+                float(np.max(error / value))
+                for error, value in ((fit.k_dn_error, fit.k_dn), (fit.sigma2_dn_error, fit.sigma2_dn))
+            )
+            if k_error > UNCERTAIN:
+                yield f"ISO {iso:g}: k is uncertain by {100 * k_error:.1f} %; take more frames"
+            if sigma2_error > SIGMA2_UNCERTAIN:
+                yield (
+                    f"ISO {iso:g}: sigma2 is uncertain by {100 * sigma2_error:.0f} %; take dark frames, or "
+                    f"more of them"
+                )
