@@ -326,6 +326,16 @@ def test_a_line_that_means_little_is_said(tmp_path, rng):
     assert "sigma2 is uncertain by " not in notes("bright", images, dark=6)
 
 
+def test_sites_of_noisy_dark_frames_are_not_told_apart_by_chance(tmp_path, rng):
+    """12 bits that a program stored as 16: what is 0.5 DN between the sites is a hundredth of their noise."""
+    lit = write_arrays(tmp_path / "lit", [to_dn(raw) * 60 for raw in exposures(rng, scene(), 1600, 6)])
+    dark = write_arrays(tmp_path / "dark", [to_dn(raw) * 60 for raw in exposures(rng, scene(0.0), 1600, 6)])
+    layout = replace(LAYOUT, black_level=None, white_level=61380)
+    found = calibrate(lit, name="x", dark=dark, layout=layout)
+    assert np.ptp(found.fits[0].black) > 0.5
+    assert not any("sites differ" in note for note in found.notes)
+
+
 def test_sites_of_other_black_levels_are_measured_stated_and_kept(tmp_path, rng):
     """k and sigma2 are those of the camera with and without dark frames; the profile has the true levels."""
     above = np.zeros((SIDE, SIDE), np.uint16)

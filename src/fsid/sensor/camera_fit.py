@@ -40,6 +40,7 @@ BLACK_DIFFERS = 0.01  # of the range, from which on dark frames contradict a bla
 BLACK_NOTED_DN = 1.0  # from which on it is noted, and from their own noise on
 SITES_APART_DN = 0.5  # from which on one black level for all sites leaves a cast in the dark
 BELOW_BLACK = 0.01  # of the pixels that may have a mean as far below the black level
+SITES_APART_SIGMA = 0.05  # of the read noise, below which nobody sees the cast
 UNCERTAIN = 0.02  # relative standard error of k that deserves a note
 SIGMA2_UNCERTAIN = 0.2  # of sigma2, which hardly shows in bright pictures
 CROOKED = 0.05  # relative departure of the samples from their line that does
@@ -272,8 +273,10 @@ def _notes(reader: _Reader, isos: Sequence[float], fits: Sequence[NoiseFit]) -> 
         source = "--black-level" if reader.found.camera.bare else "the files' black level"
         yield f"{path}: dark frames have a mean of {measured:.1f} DN, {source} is {stated}, which is kept"
     black = np.mean([fit.black for fit in fits], axis=0)
-    if reader.found.camera.bare and np.ptp(black) > SITES_APART_DN:
-        levels = ",".join(f"{level:.4g}" for level in black)
+    read_dn = min(float(np.sqrt(fit.sigma2_dn.mean())) for fit in fits)
+    apart_dn = max(SITES_APART_DN, SITES_APART_SIGMA * read_dn)
+    if reader.found.camera.bare and np.ptp(black) > apart_dn:
+        levels = ",".join(f"{round(level, 1):g}" for level in black.tolist())
         yield f"the black levels of the sites differ: denoise such mosaics with --black-level {levels}"
     for iso in sorted(set(reader.cut_off)):
         yield f"ISO {iso:g}: dark noise reaches DN 0 and is cut off; corrected as far as it is Gaussian"
