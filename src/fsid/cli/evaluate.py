@@ -28,7 +28,8 @@ def evaluate(
 
     Args:
         testset: Folder made by fsid testset.
-        model: Folder of a training, or a model file; may be given several times.
+        model: Folder of a training, a model file, or the name of a shipped network (nafnet-small); may be
+            given several times. Without it only the noisy input and the classical denoiser are measured.
         output: Folder of the results.
         quiet: No progress bar.
     """
