@@ -276,6 +276,30 @@ def test_what_is_said_of_files_does_not_depend_on_a_broken_one(
     assert f"{folder / 'b.dng'}: more noise than networks keep" in said
 
 
+def test_a_folder_may_be_finished_without_doing_it_again(
+    tmp_path: Path, network: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder := tmp_path / "in").mkdir()
+    for name in ("a", "b"):
+        write_dng(folder / f"{name}.dng", noisy_raw())
+    command = ["denoise", str(folder), str(out := tmp_path / "out"), "--model", str(network)]
+    out.mkdir()
+    (out / "a.dng").write_bytes(b"made before")
+    main([*command, "--skip-existing"])
+    assert f"note: 1 of 2 files are in {out} already and left alone" in capsys.readouterr().err
+    assert (out / "a.dng").read_bytes() == b"made before"
+    whole = (out / "b.dng").read_bytes()
+    main([*command, "--quiet"])
+    assert (out / "a.dng").read_bytes() != b"made before"
+    assert (out / "b.dng").read_bytes() == whole
+    main([*command, "--skip-existing", "--quiet"])
+    with pytest.raises(SystemExit):
+        main(
+            ["denoise", str(folder / "a.dng"), str(out / "c.dng"), "--model", str(network), "--skip-existing"]
+        )
+    assert "--skip-existing: is for a folder" in capsys.readouterr().err
+
+
 def test_a_picture_keeps_its_own_iso(noisy_file: Path, network: Path) -> None:
     out = noisy_file.parent / "out.dng"
     own = read_raw(noisy_file).iso

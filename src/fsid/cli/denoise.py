@@ -36,6 +36,7 @@ def denoise(
     white_level: int | None = None,
     width: int | None = None,
     height: int | None = None,
+    skip_existing: bool = False,
     quiet: bool = False,
 ) -> None:
     """Denoise a Bayer RAW of any size, or a folder of them. The noise level is the file's NoiseProfile, that
@@ -62,14 +63,18 @@ def denoise(
         white_level: White level (saturation) of a bare mosaic in DN.
         width: Width of a .raw or .bin mosaic in pixels.
         height: Height of a .raw or .bin mosaic in pixels.
+        skip_existing: Leave alone what an earlier, interrupted run over a folder has made.
         quiet: No progress bar, no line on the noise level.
     """
     from fsid.denoise import check_options, denoise_file, denoise_folder, find_raws, load_model
+    from fsid.denoise.files import target_in
     from fsid.sensor import Layout
 
     given = Layout(None, cfa, black_levels(black_level), white_level, width, height)
     layout = given if given != Layout() else None
     sources = find_raws(input, bare=layout is not None) if input.is_dir() else None
+    if skip_existing and sources is None:
+        raise FsidError("--skip-existing: is for a folder of files; leave it out")
     if layout is not None:
         _check_layout(layout, sources or [input])
         _note_black(layout, profile, quiet=quiet)
@@ -83,6 +88,8 @@ def denoise(
     if sources is not None:
         if not quiet:
             _note_left_out(input, output, bare=layout is not None)
+        if skip_existing and (made := [path for path in sources if target_in(output, path).is_file()]):
+            _note(f"{len(made)} of {len(sources)} files are in {output} already and left alone", quiet=quiet)
         noises: dict[Path, Noise] = {}
         try:
             with progress_bar("denoising", "files", quiet=quiet) as progress:
@@ -94,6 +101,7 @@ def denoise(
                     iso=iso,
                     strength=strength,
                     layout=layout,
+                    skip_existing=skip_existing,
                     progress=progress,
                     denoised=noises.__setitem__,
                     failed=lambda error: console.print(

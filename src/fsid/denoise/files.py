@@ -174,6 +174,11 @@ def denoise_file(
     return noise
 
 
+def target_in(folder: Path, source: Path) -> Path:
+    """What `denoise_folder` makes of `source`."""
+    return folder / f"{source.stem}.dng"
+
+
 def denoise_folder(
     sources: Sequence[str | Path],
     target: str | Path,
@@ -183,23 +188,28 @@ def denoise_folder(
     iso: float | None = None,
     strength: float = 1.0,
     layout: Layout | None = None,
+    skip_existing: bool = False,
     progress: Callable[[int, int], None] | None = None,
     denoised: Callable[[Path, Noise], None] = lambda source, noise: None,
     failed: Callable[[FsidError], None] = lambda error: None,
 ) -> dict[Path, Noise]:
     """Denoise each of `sources` into a DNG of its name in the folder `target`, which is made.
 
-    The noise level that was used for each is returned. denoised: told of each that is done. failed: told of
-    each file that cannot be denoised; FsidError says in the end how many they were. What is wrong with all of
-    them `check_options` tells before.
+    The noise level that was used for each is returned. skip_existing: leave alone what is in `target`
+    already; it is whole, as a DNG appears when all of it is written. denoised: told of each that is done.
+    failed: told of each file that cannot be denoised; FsidError says in the end how many they were. What is
+    wrong with all of them `check_options` tells before.
     """
     target, paths = Path(target), list(map(Path, sources))
     names = [path.stem for path in paths]
     if twice := sorted({name for name in names if names.count(name) > 1}):
         raise FsidError(f"{paths[0].parent}: several files would become {twice[0]}.dng; rename one")
-    targets = [target / f"{name}.dng" for name in names]
+    targets = [target_in(target, path) for path in paths]
     if {path.resolve() for path in targets} & {path.resolve() for path in paths}:
         raise FsidError(f"{target}: is the folder of the originals, which would be overwritten")
+    if skip_existing:
+        left = [pair for pair in zip(paths, targets, strict=True) if not pair[1].is_file()]
+        paths, targets = [source for source, _ in left], [out for _, out in left]
     is_new = not target.exists()
     try:
         target.mkdir(parents=True, exist_ok=True)
