@@ -278,8 +278,10 @@ def test_the_command_makes_a_set_that_evaluate_reads(clean: Raw, tmp_path: Path,
     noisy = read_raw(testset.noisy(out, testset.images[0], "5lux", 1))
     assert noisy.noise is not None
     assert np.mean(noisy.noise.k) == pytest.approx(np.mean(PROFILE.level(1600).k), rel=0.01)
-    main(["evaluate", str(out)])
+    main(["evaluate", str(out), "-o", str(tmp_path / "results")])
     assert "fabric" in capsys.readouterr().out
+    limits = ", ".join(f"{float(line['psnr']):.1f} dB at {line['level']}" for line in lines)
+    assert f"its own PSNR in RAW ({limits}, of" in (tmp_path / "results/report.html").read_text()
 
 
 def test_the_report_names_captures_and_shows_them_upright(clean: Raw, tmp_path: Path):

@@ -92,7 +92,7 @@ def burst_testset(
     qualities = []
     name = load_profile(camera).name if camera else ""
     images = tuple(TestImage(scene, scene) for scene in scenes)
-    testset = TestSet(name, levels, images, 0, "captured bursts, truth by robust averaging", frames)
+    testset = TestSet(name, levels, images, 0, "", frames)  # refuses a list that cannot be one
     with staged(out) as root:
         for done, ((scene, level), paths) in enumerate(bursts.items()):
             progress(done, len(bursts))
@@ -108,7 +108,7 @@ def burst_testset(
                 write_dng(target, exact_levels(replace(raw, noise=_noise(raw, camera, path))))
             qualities.append(quality)
         progress(len(bursts), len(bursts))
-        testset = replace(testset, camera=name)
+        testset = replace(testset, camera=name, notes=_notes(levels, qualities))
         write_testset(root, testset)
         write_atomically(root / "truth.csv", _csv(qualities).encode())
     return testset, qualities
@@ -251,6 +251,16 @@ def _noise(raw: Raw, camera: str | Path, path: Path) -> NoiseLevel:
         return stated_noise(raw) or estimate_noise(raw).level
     except FsidError as error:
         raise FsidError(f"{path}: {error}; --camera names a profile of its noise") from None
+
+
+def _notes(levels: Sequence[str], qualities: Sequence[TruthQuality]) -> str:
+    """What the report says of the truths: how good the least one of each level is."""
+    least = {level: min(q.psnr for q in qualities if q.level == level) for level in levels}
+    limits = ", ".join(f"{psnr:.1f} dB at {level}" for level, psnr in least.items())
+    return (
+        f"captured bursts, truth by robust averaging; no method can be measured beyond its own PSNR in RAW "
+        f"({limits}, of the least image)"
+    )
 
 
 def _level_order(level: str) -> tuple[float, str]:
