@@ -27,6 +27,7 @@ from fsid.sensor import (
 from fsid.sensor.colour import published_matrices
 from fsid.sensor.dng import read_stored
 from fsid.sensor.dng_tags import noise_profile
+from fsid.sensor.metadata import Metadata
 from fsid.sensor.tiff import ASCII, BYTE, CFA, LONG, SHORT, Directory, Tag, image_tags, tiff_bytes
 
 HEIGHT, WIDTH = 34, 50
@@ -66,6 +67,18 @@ def test_round_trip(tmp_path, cfa, preview):
     np.testing.assert_allclose(back.white_balance, raw.white_balance, rtol=1e-6)
     np.testing.assert_allclose(back.xyz_to_camera, raw.xyz_to_camera, rtol=1e-9)
     assert [p.name for p in tmp_path.iterdir()] == ["a.dng"]
+
+
+@pytest.mark.parametrize(("large", "iso"), [(34866, 102400), (34867, 204800), (None, 65535)])
+def test_an_iso_that_its_tag_does_not_hold_is_read_where_it_stands(tmp_path, large, iso):
+    """Of a camera, which has no private data of FSID; and it stays where it was."""
+    said = Tag(34855, SHORT, (65535,)), *((Tag(large, LONG, (iso,)),) if large else ())
+    path = tmp_path / "a.dng"
+    write_dng(path, replace(_raw("RGGB"), iso=0, metadata=Metadata(exif=said)))
+    path.write_bytes(path.read_bytes().replace(b"FSID\0", b"None\0", 1))
+    raw = read_raw(path)
+    assert raw.iso == iso
+    assert {tag.code: tag.values for tag in raw.metadata.exif} == {tag.code: tag.values for tag in said}
 
 
 @pytest.mark.parametrize("cfa", CFA_PATTERNS)

@@ -49,6 +49,7 @@ _KELVIN |= {12: 6400, 13: 5050, 14: 4150, 15: 3450, 16: 2950, 17: 2850, 18: 5500
 _KELVIN |= {20: 5500, D65: 6500, 22: 7500, 23: 5000, 24: 3200}  # of each LightSource; of a range, its middle
 _UNKNOWN_KELVIN = 5000  # between lamps and daylight
 MAX_EXIF_ISO = 65535
+LARGE_ISOS = (34865, 34866, 34867)  # standard output sensitivity, recommended exposure index, ISO speed
 MAX_SIDE = 65535  # pixels that LibRaw opens
 MAX_REPEAT = 16  # rows and columns of a pattern of black levels; LibRaw rounds them and keeps 2 x 2
 
@@ -132,9 +133,16 @@ def noise_level(tags: Tags) -> NoiseLevel | None:
 
 
 def iso_speed(tags: Tags) -> float:
-    """The ISO that `tags` state, exact where FSID wrote it; 0 where they state none."""
-    private = _private_numbers(tags)
-    return private[0] if private else float(_number(tags, EXIF_ISO, 0))
+    """The ISO that `tags` state, exact where FSID wrote it; 0 where they state none.
+
+    65535 is the largest that the tag holds and means more; then others say how much (EXIF 2.3, 4.6.5).
+    """
+    if private := _private_numbers(tags):
+        return float(private[0])
+    iso = float(_number(tags, EXIF_ISO, 0))
+    if iso < MAX_EXIF_ISO:
+        return iso
+    return max(iso, *(float(_number(tags, code, 0)) for code in LARGE_ISOS))
 
 
 def exposure_time_s(tags: Tags) -> float:

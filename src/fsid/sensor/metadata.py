@@ -28,9 +28,9 @@ _FIRST |= frozenset((*range(50936, 50943), 50981, 50982, 51107, 51108, 51109, 51
 # Crop, green split, chroma blur, anti-alias, scale; lens corrections that converters apply to linear data.
 _MOSAIC = frozenset((CROP_ORIGIN, CROP_SIZE, 50718, 50733, 50737, 50738, 50780, 51009, 51022, 51125))
 _GEOMETRY = frozenset((CROP_ORIGIN, CROP_SIZE, 51009, 51022, 51125))
-_EXIF = frozenset((EXPOSURE_TIME, F_NUMBER, 34850, 34855, 34864, 34866, 36864, 36867, 36868, 36880, 36881))
+_EXIF = frozenset((EXPOSURE_TIME, F_NUMBER, 34850, 34855, 34864, 34865, 34866, 34867, 36864, 36867, 36868))
 _EXIF |= frozenset((*range(37377, 37387), 37510, 37520, 37521, 37522, 41985, 41986, 41987, 41989, 41990))
-_EXIF |= frozenset((42033, 42034, 42035, FOCAL_LENGTH, LENS_MODEL, 42037))
+_EXIF |= frozenset((36880, 36881, 42033, 42034, 42035, FOCAL_LENGTH, LENS_MODEL, 42037))
 
 _ORIENTATION_OF_FLIP = {0: 1, 3: 3, 5: 8, 6: 6}  # LibRaw's flip to TIFF's orientation
 
