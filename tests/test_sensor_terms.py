@@ -312,6 +312,18 @@ def test_dark_shading_is_no_defect_and_hot_pixels_in_it_are(rng, share):
     assert found.terms.fixed == 0
 
 
+def test_hot_pixels_make_no_tail(rng):
+    """Their current has shot noise, many times that of a pixel in the dark; `defective` has them already."""
+    hot = np.where(rng.random((160, 160)) < 0.002, rng.exponential(300, (160, 160)), 0)
+    stats = TemporalStatistics(4095, dark=True)
+    for _ in range(20):
+        stats.add(np.rint(256 + 3 * rng.normal(size=hot.shape) + rng.poisson(hot)).astype(np.int64))
+    found = dark_finding(stats, 400, 0.1)
+    assert found is not None
+    assert found.terms.tail < 0.1
+    assert found.terms.defective == pytest.approx((hot > 0).mean(), rel=0.2)
+
+
 @pytest.mark.parametrize("sigma_dn", [0.8, 1.0])
 def test_means_of_few_integers_show_no_fixed_pattern(rng, sigma_dn):
     """Their steps are multiples of 0.1 DN; the median of those of 0.36 DN is 0.3 or 0.4."""

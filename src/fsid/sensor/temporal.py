@@ -13,7 +13,8 @@ The noise of dark frames is counted for each place in the 2x2 tile of the filter
 differ in noise, and four normal distributions of different width make one with a tail. A sensor without
 filters has four such places, all alike.
 
-Sums count from the first frame, so that they stay small. Memory is 22 bytes per pixel, however many frames.
+Sums count from the first frame, so that they stay small. Memory is 22 bytes per pixel, 30 where the noise of
+dark frames is counted, however many frames.
 """
 
 from __future__ import annotations
@@ -161,10 +162,17 @@ class TemporalStatistics:
         self._check()
         return float(np.ptp(self._reference))
 
-    def read_statistics(self) -> ReadStatistics:
-        """What the noise is made of; for bursts of dark frames."""
+    def read_statistics(self, left_out: np.ndarray | None = None) -> ReadStatistics:
+        """What the noise is made of; for bursts of dark frames.
+
+        left_out: (H, W) bool, pixels whose own noise shall not count: that of a hot one is another.
+        """
         self._check()
-        second, fourth = self._moments / (self.frames - 1)
+        counted = np.ones(self._powers.shape[1:], bool) if left_out is None else ~left_out
+        second, fourth = (
+            np.array([power[site][counted[site]].mean(dtype=np.float64) for site in TILE]) / (self.frames - 1)
+            for power in self._powers
+        )
         row, column = self._banding / (self.frames - 1)
         kurtosis = fourth[second > 0] / second[second > 0] ** 2
         sigma = np.sqrt(np.maximum(second / 2 - ROUNDING_DN2, 0)).reshape(2, 2)
@@ -198,7 +206,8 @@ class TemporalStatistics:
         self._first = dn.astype(np.uint16)
         self._sum, self._squares = np.zeros(dn.shape), np.zeros(dn.shape)
         self._zeros, self._whites = np.zeros(dn.shape, np.uint16), np.zeros(dn.shape, np.uint16)
-        self._moments = np.zeros((2, len(TILE)))  # sums over frames: mean d^2 and d^4 of each site
+        if self._dark:
+            self._powers = np.zeros((2, *dn.shape), np.float32)  # sums over frames: d^2 and d^4 of each pixel
         self._banding = np.zeros(2)  # sums over frames: variance of row means, of column means
         self._blocks = Blocks.of(dn.shape)  # as much of each site in every block
         self._moved = np.zeros(self._blocks.grid, bool)
@@ -232,8 +241,8 @@ class TemporalStatistics:
         pixel = float(squares.mean())
         rows, columns = d.mean(axis=1), d.mean(axis=0)
         self._banding += rows.var() - pixel / width, columns.var() - pixel / height
-        for moment in self._moments:
-            moment += [squares[site].mean() for site in TILE]
+        for power in self._powers:
+            power += squares
             squares *= squares
 
 

@@ -51,13 +51,13 @@ class DarkFinding:
 
 def dark_finding(stats: TemporalStatistics, iso: float, exposure_s: float) -> DarkFinding | None:
     """The terms that dark frames show; None where their noise drowns in rounding or is cut off at DN 0."""
-    found = stats.read_statistics()
+    mean = stats.mean()
+    far = defective(mean)
+    found = stats.read_statistics(left_out=far)
     if found.pixel_dn2 < RESOLVED_DN2 or stats.zero_share > CUT_OFF:
         return None
-    mean = stats.mean()
     left = (found.pixel_dn2 - found.row_dn2) / stats.frames  # between neighbours in a row
     fixed2 = max(_spread2(mean) - left, 0.0)
-    far = defective(mean)
     before2 = found.pixel_dn2 - ROUNDING_DN2
     row, column = (part / found.sigma_dn**2 for part in (found.row_dn2, found.column_dn2))
     alone = max(1 - row - column, _LEAST_ALONE) * before2 / found.pixel_dn2
