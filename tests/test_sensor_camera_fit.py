@@ -287,10 +287,11 @@ def test_bare_dark_frames_that_drift_are_one_burst(tmp_path, rng):
     np.testing.assert_allclose(fit.sigma2_dn / 959**2, PROFILE.level(3200).sigma2, rtol=0.05)
 
 
-def test_a_frame_counts_once_and_hidden_files_not_at_all(tmp_path, rng):
+def test_a_frame_counts_once_and_hidden_files_and_pictures_not_at_all(tmp_path, rng):
     folder = tmp_path / "iso800" / "deeper"
     frames = write_arrays(folder, [to_dn(raw) for raw in exposures(rng, scene(), 800, 5)])
-    (folder / ".DS_Store").write_bytes(b"no frame")
+    for name in (".DS_Store", "000.JPG", "000.heic", "000.xmp"):
+        (folder / name).write_bytes(b"no frame")
     found = find_frames([tmp_path, *frames], [], LAYOUT)
     assert [frame.path for frame in found.frames] == frames
     assert {frame.iso for frame in found.frames} == {800}

@@ -38,13 +38,12 @@ from fsid.sensor import (
     write_dng,
 )
 from fsid.sensor.blind import stated_noise
+from fsid.sensor.frames import BESIDE_RAW
 
 OUTLIER_SIGMA = 4.0
 MAX_NOISY_FLICKER = 0.01
 """Largest difference in brightness of a noisy frame from the first, whose light the truth has."""
 _PATCH_TILES = 7
-_BESIDE_RAW = frozenset((".jpg", ".jpeg", ".heic", ".heif", ".xmp"))
-"""What phones and converters store beside a RAW file."""
 
 
 @dataclass(frozen=True)
@@ -157,7 +156,7 @@ def _find_bursts(captures: Path, frames: int) -> dict[tuple[str, str], list[Path
     scenes = _folders(captures)  # not glob, which passes over a folder that it may not read
     for folder in (level for scene in scenes for level in _folders(scene)):
         files = (p for p in folder.iterdir() if p.is_file() and not p.name.startswith("."))
-        paths = sorted(p for p in files if p.suffix.lower() not in _BESIDE_RAW)
+        paths = sorted(p for p in files if p.suffix.lower() not in BESIDE_RAW)
         if len(paths) < frames + LEAST_FRAMES:
             raise FsidError(
                 f"{folder}: holds {len(paths)} frames; {frames} noisy and at least {LEAST_FRAMES} more for "

@@ -29,6 +29,8 @@ from fsid.sensor.quantise import check_levels
 SAME_LIGHT, SAME_DN = 0.03, 0.5  # difference of the levels of two frames of one burst, relative or in DN
 SAME_DARK = 3.0  # difference of the levels of two dark frames of one burst, in standard deviations of a pixel
 SAME_BLACK_DN = 1.0  # difference of the stated black levels of two frames of one mode: phones measure it anew
+BESIDE_RAW = frozenset((".jpg", ".jpeg", ".heic", ".heif", ".xmp"))
+"""What phones and converters store beside a RAW file."""
 _ISO_IN_PATH = re.compile(r"iso[-_ ]?(\d+)", re.IGNORECASE)
 _SITES_DIFFER = 0.02  # of the level: a flat grey through colour filters differs by far more
 
@@ -164,7 +166,8 @@ def frame_files(paths: Sequence[Path]) -> list[Path]:
 
 
 def _inside(folder: Path) -> list[Path]:
-    """The files of a folder and of its folders, hidden ones left out; OSError where one may not be read."""
+    """The files of a folder and of its folders, without hidden ones and `BESIDE_RAW`; OSError where one may
+    not be read."""
 
     def refuse(error: OSError) -> None:
         raise error
@@ -173,7 +176,7 @@ def _inside(folder: Path) -> list[Path]:
     for top, folders, names in os.walk(folder, onerror=refuse):
         folders[:] = [name for name in folders if not name.startswith(".")]
         files += [Path(top, name) for name in names if not name.startswith(".")]
-    return sorted(path for path in files if path.is_file())
+    return sorted(path for path in files if path.suffix.lower() not in BESIDE_RAW and path.is_file())
 
 
 def _raw_frames(paths: Sequence[Path], dark: Sequence[Path], layout: Layout) -> FrameSet:
