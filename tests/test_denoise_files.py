@@ -385,6 +385,17 @@ def test_what_no_reader_would_open_is_not_written(tmp_path: Path, network: Path)
     assert not (tmp_path / "out.dng").exists()
 
 
+def test_a_preview_is_the_mean_of_what_it_covers() -> None:
+    """Columns of every colour, by turns dark and light, at half the size: an even picture between them."""
+    stripes = np.broadcast_to(np.array([0.2, 0.2, 0.6, 0.6], np.float32), (8, 500, 4))
+    raw = Raw(stripes.reshape(8, 2000), "RGGB", 64, 1023, (2.0, 1.0, 1.5), np.eye(3))
+    even = replace(raw, mosaic=np.full_like(raw.mosaic, 0.4))
+    preview, expected = preview_of(raw), preview_of(even)
+    assert preview is not None
+    assert preview.shape == (4, 1000, 3)
+    np.testing.assert_array_equal(preview, expected)
+
+
 def test_a_large_preview_is_small(rng: np.random.Generator) -> None:
     raw = replace(noisy_raw(), mosaic=rng.random((64, 5000), dtype=np.float32))
     preview = preview_of(raw)
