@@ -185,7 +185,9 @@ def _too_low_dn(samples: Samples, k: float, sigma2: float) -> float:
     weight = freedom / (2 * np.maximum(k * signal + sigma2, 1e-3) ** 2)
     slope, intercept, error = _weighted_line(signal, variance, weight)
     missing = ROUNDING_DN2 - intercept
-    return missing / slope if slope > 0 and missing > _SURE * error[1] else 0.0
+    scatter = float((weight * (variance - slope * signal - intercept) ** 2).sum() / max(len(signal) - 2, 1))
+    is_sure = missing > _SURE * error[1] * np.sqrt(max(scatter, 1.0))
+    return missing / slope if slope > 0 and is_sure else 0.0
 
 
 def _pool(mean: np.ndarray, variance: np.ndarray, frames: int, black: float, white: int) -> Samples:

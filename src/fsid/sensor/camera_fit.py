@@ -39,6 +39,7 @@ DARK_CONTRAST = 0.02  # of the range between blocks, above which a dark frame sh
 BLACK_DIFFERS = 0.01  # of the range, from which on dark frames contradict a black level that the user states
 BLACK_NOTED_DN = 1.0  # from which on it is noted, and from their own noise on
 SITES_APART_DN = 0.5  # from which on one black level for all sites leaves a cast in the dark
+BLACK_TOO_LOW_DN = 0.1  # from which on it is noted where there are no dark frames
 BELOW_BLACK = 0.01  # of the pixels that may have a mean as far below the black level
 SITES_APART_SIGMA = 0.05  # of the read noise, below which nobody sees the cast
 UNCERTAIN = 0.02  # relative standard error of k that deserves a note
@@ -281,7 +282,7 @@ def _notes(reader: _Reader, isos: Sequence[float], fits: Sequence[NoiseFit]) -> 
     for iso in sorted(set(reader.cut_off)):
         yield f"ISO {iso:g}: dark noise reaches DN 0 and is cut off; corrected as far as it is Gaussian"
     for iso, fit in zip(isos, fits, strict=True):
-        if (low_dn := black_too_low_dn(fit)) > 0:
+        if (low_dn := black_too_low_dn(fit)) > BLACK_TOO_LOW_DN:
             yield (
                 f"ISO {iso:g}: noise falls to nothing before light does: the black level is at least "
                 f"{low_dn:.2g} DN too low, and sigma2 unknown; give --dark frames or the right level"
