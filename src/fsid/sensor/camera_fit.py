@@ -44,7 +44,7 @@ BELOW_BLACK = 0.01  # of the pixels that may have a mean as far below the black 
 SITES_APART_SIGMA = 0.05  # of the read noise, below which nobody sees the cast
 UNCERTAIN = 0.02  # relative standard error of k that deserves a note
 SIGMA2_UNCERTAIN = 0.2  # of sigma2, which hardly shows in bright pictures
-CROOKED = 0.05  # relative departure of the samples from their line that does
+CROOKED = 0.1  # relative departure of the samples from their line that does
 
 Progress = Callable[[int, int], None]
 _Pooled = tuple[Samples, ...]
