@@ -107,3 +107,16 @@ def test_one_image_comes_near_to_many() -> None:
 def test_at_least_one_image_is_needed() -> None:
     with pytest.raises(FsidError, match="lens_images 0"):
         Renderer(lens_images=0)
+
+
+@pytest.mark.parametrize(("depth_m", "least", "most"), [(1.0, 0.0, 0.2), (FOCUS_M, 0.99, 1.01)])
+def test_pixels_that_an_edge_divides_are_blurred_as_its_near_side(
+    depth_m: float, least: float, most: float
+) -> None:
+    """Their depth may be that of the far side: they would stay sharp in a soft edge, or lose a sharp one."""
+    depth = np.full((60, 120), FOCUS_M if depth_m < FOCUS_M else 8.0, np.float32)
+    depth[:, :60] = depth_m
+    image = np.zeros((60, 120, 3), np.float32)
+    image[:, 60] = 1.0
+    seen = defocus(image, depth, aperture_of(12.0, 1.0 if depth_m < FOCUS_M else 8.0), FOCUS_M, FOCAL_PX)
+    assert least <= seen[30, 60, 1] <= most

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from scipy.ndimage import minimum_filter
 
 from fsid.render.blur import blurred, gaussian_weights
 
@@ -37,6 +38,7 @@ def defocus(
 
     aperture_m: diameter of the opening. focus_m: depth of the sharp plane. focal_px: focal length in pixels.
     """
+    depth = minimum_filter(depth, 3)  # pixels that an edge divides belong to its near side
     blur = (1 / depth - np.float32(1 / focus_m)) * np.float32(aperture_m * focal_px / 4)
     place = np.interp(blur**2, _SIGMA_PX**2, np.arange(len(_SIGMA_PX))).astype(np.float32)
     np.copysign(place, blur, out=place)  # above 0 before the sharp plane
