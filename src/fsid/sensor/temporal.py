@@ -230,7 +230,7 @@ class TemporalStatistics:
         if abs(gain - 1) > LARGEST_FLICKER:
             raise FsidError(
                 f"{name}: its light differs by {100 * (gain - 1):+.0f} % from the first frame of the burst, "
-                f"or the scene moved; use steady light and a tripod, or leave it out"
+                f"or the scene moved; use steady light and a tripod, or leave it out (dark frames: --dark)"
             )
         return gain, offset, moved
 
