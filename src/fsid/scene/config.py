@@ -136,7 +136,7 @@ class LightConfig:
     sun_share: float = knob(0.6, 0.0, 1.0)
     """Share of open-air scenes with sunlight; the others have an overcast sky or, by `night_share`, lamps."""
     night_share: float = knob(0.1, 0.0, 1.0)
-    """Share of open-air scenes that are lit by lamps under a dark sky."""
+    """Share of open-air scenes lit by lamps under the sky of dusk, about as bright as what they light."""
     sun_to_sky: Range = knob((0.5, 3.0), 0.01, 100.0)
     """Irradiance of the sun relative to that of the sky; log-uniform."""
 
