@@ -7,8 +7,8 @@ Normals are stored as slopes because slopes average correctly over a footprint w
 give steps. `spread` is the standard deviation of the slopes within a texel, those that a mip level has
 averaged away and those between texels; the shader turns it into roughness (Olano and Baker 2010, "LEAN
 Mapping": lost slope variance is microfacet variance), so that glossy relief does not sparkle when a texel of
-it is a pixel or less. Mip levels are averaged here in
-float, not by the driver: alike everywhere, and rounded once.
+it is a pixel or less. Mip levels are averaged here in float, not by the driver: alike everywhere, and rounded
+once.
 
 A scene has a hundred materials and few of them are those of the scene before, so most layers are read from
 the disk for every frame: what is kept is ready for use, and deflated only where that saves most of it,

@@ -87,8 +87,7 @@ def rig_rand(
     while baseline_m > _LEAST_BASELINE_M and not _are_inside(position + across * baseline_m, background):
         baseline_m *= 0.9
     eyes = []
-    for eye in range(config.eyes):
-        shift = right * baseline_m * (eye - (config.eyes - 1) / 2)
+    for eye, shift in enumerate(across * baseline_m):
         aim = target + shift * (1 - config.convergence)
         eyes.append(replace(camera, position_m=vec3(position + shift), target_m=vec3(aim), eye=eye))
     return eyes

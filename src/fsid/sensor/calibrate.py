@@ -174,10 +174,10 @@ def black_too_low_dn(fit: NoiseFit) -> float:
 
 def _departure(samples: Samples, k: float, sigma2: float) -> float:
     signal, variance, freedom = samples.in_use()
-    away2 = (variance / np.maximum(k * signal + sigma2, 1e-3) - 1) ** 2
-    if (away2 * freedom / 2).sum() < _CROOKED * max(len(signal) - 2, 1):
+    away = variance / np.maximum(k * signal + sigma2, 1e-3) - 1
+    if _scatter(away, freedom / 2) < _CROOKED:
         return 0.0
-    return float(np.sqrt(max(away2.mean() - (2 / np.maximum(freedom, 1e-9)).mean(), 0.0)))
+    return float(np.sqrt(max((away**2).mean() - (2 / np.maximum(freedom, 1e-9)).mean(), 0.0)))
 
 
 def _too_low_dn(samples: Samples, k: float, sigma2: float) -> float:
@@ -185,7 +185,7 @@ def _too_low_dn(samples: Samples, k: float, sigma2: float) -> float:
     weight = freedom / (2 * np.maximum(k * signal + sigma2, 1e-3) ** 2)
     slope, intercept, error = _weighted_line(signal, variance, weight)
     missing = ROUNDING_DN2 - intercept
-    scatter = float((weight * (variance - slope * signal - intercept) ** 2).sum() / max(len(signal) - 2, 1))
+    scatter = _scatter(variance - slope * signal - intercept, weight)
     is_sure = missing > _SURE * error[1] * np.sqrt(max(scatter, 1.0))
     return missing / slope if slope > 0 and is_sure else 0.0
 
@@ -281,9 +281,13 @@ def _line(samples: Samples) -> tuple[float, float, float, float]:
             sigma2 = ROUNDING_DN2
             k = float((weight * signal * (variance - sigma2)).sum() / (weight * signal**2).sum())
         model = k * signal + sigma2
-    scatter = float((weight * (variance - model) ** 2).sum() / max(len(signal) - 2, 1))
-    k_error, sigma2_error = error * np.sqrt(max(scatter, 1.0))
+    k_error, sigma2_error = error * np.sqrt(max(_scatter(variance - model, weight), 1.0))
     return k, sigma2, float(k_error), float(sigma2_error)
+
+
+def _scatter(residual: np.ndarray, weight: np.ndarray) -> float:
+    """Mean square of residuals from a line, 1 where they are what the weights, inverse variances, say."""
+    return float((weight * residual**2).sum() / max(len(residual) - 2, 1))
 
 
 def _weighted_line(
