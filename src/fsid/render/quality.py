@@ -30,7 +30,7 @@ class Quality:
 
 QUALITIES = {
     "high": Quality(search_taps=8, filter_taps=16, occlusion_taps=128, probes=4.0, shadow_px=1024, shots=64),
-    "fast": Quality(search_taps=6, filter_taps=9, occlusion_taps=14, probes=2.0, shadow_px=512, shots=24),
+    "fast": Quality(search_taps=6, filter_taps=9, occlusion_taps=32, probes=2.0, shadow_px=512, shots=24),
 }
 
 
