@@ -245,6 +245,15 @@ def test_a_library_gives_sizes_turns_and_licences(tmp_path: Path):
     assert mesh_sources(tmp_path, cc0_only=True) == (f"file:{path}!a/cube.obj",)
 
 
+@pytest.mark.parametrize("end", ["\r\n", "\r"])
+def test_the_lines_of_a_catalogue_end_in_any_way(tmp_path: Path, end: str):
+    entries = ["license=CC0 ", "model#1 = /a/cube.obj ", "width#1=40", "depth#1=60", "height#1=50", ""]
+    path = library(tmp_path / "some.sh3f", end.join(entries), a__cube=cube_obj())
+    (source,) = survey_meshes(str(tmp_path)).usable
+    assert (source.name, source.licence) == (f"file:{path}!a/cube.obj", "CC0")
+    np.testing.assert_allclose(source.size_m, (0.4, 0.6, 0.5), atol=1e-5)
+
+
 def test_only_stated_public_domain_counts_as_cc0(tmp_path: Path):
     for folder, licence in (("a", "CC0 1.0 Universal"), ("b", "CC BY 4.0"), ("c", None)):
         (tmp_path / folder / "deep").mkdir(parents=True)

@@ -202,6 +202,11 @@ def test_a_catalogue_bomb_is_not_unpacked(tmp_path: Path):
     assert "unpacks to" in refused(tmp_path)
 
 
+def test_a_catalogue_of_blanks_takes_no_time(tmp_path: Path):
+    library(tmp_path / "x.sh3f", f"license=a{' ' * 10**6}b\nmodel#1=missing.obj\n", {})
+    assert "not in the archive" in refused(tmp_path)
+
+
 @pytest.mark.parametrize("name", ["../../climbed.obj", "/abs/climbed.obj", "a/../../climbed.obj"])
 def test_members_that_climb_write_nothing(tmp_path: Path, name: str):
     """They are read under their name inside the archive, or not at all; nothing is unpacked to disk."""

@@ -27,7 +27,7 @@ from fsid.assets.sources.limits import (
 )
 
 CATALOGUE = "PluginFurnitureCatalog.properties"
-_LINE = re.compile(r"^[ \t]*([\w.]+(?:#\d+)?)[ \t]*[=:][ \t]*(.*?)[ \t]*$", re.MULTILINE)
+_LINE = re.compile(r"^[ \t]*([\w.]+(?:#\d+)?)[ \t]*[=:](.*)$", re.MULTILINE)
 _END_RECORD = struct.Struct("<4s4H2LH")
 
 
@@ -50,7 +50,8 @@ def read_catalogue(path: Path) -> tuple[Entry, ...]:
             text = _read(archive, CATALOGUE, MAX_CATALOGUE_BYTES).decode("latin-1")
         except KeyError:
             raise RefusedError(f"no {CATALOGUE} in it") from None
-        values = {key: _unescaped(value) for key, value in _LINE.findall(text)}
+        lines = text.replace("\r\n", "\n").replace("\r", "\n")
+        values = {key: _unescaped(value.strip(" \t")) for key, value in _LINE.findall(lines)}
         numbers = [key.partition("#")[2] for key in values if key.startswith("model#")]
         return tuple(_entry(values, number, archive) for number in numbers)
 
