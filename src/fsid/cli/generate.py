@@ -117,7 +117,7 @@ def generate(
     if not settings.images:
         read_mesh_folders(settings.scene, quiet=quiet)
     if dry_run:
-        Console().print(_plan(out, settings, dataset, count, workforce), soft_wrap=True)
+        Console(markup=False).print(_plan(out, settings, dataset, count, workforce), soft_wrap=True)
     else:
         if not is_begun(out, dataset):
             _check_sources(settings, count, workforce, quiet=quiet)
