@@ -301,6 +301,13 @@ def test_photographs_of_other_numbers_are_refused(kind: type, tmp_path: Path) ->
         read_photo(tmp_path / "odd.tif")
 
 
+def test_a_program_that_is_called_a_photograph_is_not_run(tmp_path: Path) -> None:
+    """PostScript, for which Pillow starts Ghostscript."""
+    Image.new("RGB", (64, 64), "red").save(tmp_path / "page.png", format="EPS")
+    with pytest.raises(FsidError, match=r"page\.png: cannot be read as a photograph \(cannot identify"):
+        read_photo(tmp_path / "page.png")
+
+
 def test_a_photograph_of_a_wider_colour_space_is_brought_to_srgb():
     """One in Adobe RGB (1998), against the formulas of its specification."""
     path = Path(skimage.__file__).parent / "data" / "rocket.jpg"

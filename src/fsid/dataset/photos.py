@@ -16,6 +16,8 @@ SMALLEST_PX = 32
 _BLACK = 0.02  # sRGB-encoded; a photograph that is darker everywhere shows nothing
 _WITHOUT_ALPHA = {"P": "RGB", "PA": "RGB", "RGBA": "RGB", "RGBX": "RGB", "LA": "L", "1": "L"}
 PHOTO_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".bmp")
+_FORMATS = ("PNG", "JPEG", "TIFF", "WEBP", "BMP")
+"""Whatever a file is called: others Pillow may hand to programs of their own, PostScript to Ghostscript."""
 
 
 def find_photos(folder: str | Path) -> list[Path]:
@@ -59,7 +61,7 @@ def check_photo(path: str | Path) -> None:
 def _read(path: str | Path, shrink: int = 1) -> np.ndarray:
     """As `read_photo`; a JPEG `shrink` times smaller, which its decoder does quickly."""
     try:
-        with Image.open(path) as image:
+        with Image.open(path, formats=_FORMATS) as image:
             width, height = image.size
             if min(width, height) < SMALLEST_PX:
                 needed = f"at least {SMALLEST_PX}x{SMALLEST_PX} are needed"
