@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path
@@ -116,12 +116,7 @@ class FrameSet:
         return camera.black.levelled(stored.dn, camera.black_level, camera.white_level)
 
 
-def find_frames(
-    paths: Sequence[Path],
-    dark: Sequence[Path],
-    layout: Layout,
-    progress: Callable[[int, int], None] | None = None,
-) -> FrameSet:
+def find_frames(paths: Sequence[Path], dark: Sequence[Path], layout: Layout) -> FrameSet:
     """Look at every file once: RAW headers, and the level and maximum of bare mosaics."""
     paths, dark = frame_files(paths), frame_files(dark)
     if not paths:
@@ -135,7 +130,7 @@ def find_frames(
         if (path.suffix.lower() in BARE_SUFFIXES) != bare:
             raise FsidError(f"{path}: RAW files and bare mosaics in one calibration; give frames of one kind")
     if bare:
-        return _bare_frames(paths, dark, layout, progress)
+        return _bare_frames(paths, dark, layout)
     return _raw_frames(paths, dark, layout)
 
 
@@ -205,12 +200,7 @@ def _raw_frames(paths: Sequence[Path], dark: Sequence[Path], layout: Layout) -> 
     )
 
 
-def _bare_frames(
-    paths: Sequence[Path],
-    dark: Sequence[Path],
-    layout: Layout,
-    progress: Callable[[int, int], None] | None,
-) -> FrameSet:
+def _bare_frames(paths: Sequence[Path], dark: Sequence[Path], layout: Layout) -> FrameSet:
     cfa = None if layout.cfa in (None, "MONO") else check_cfa(str(layout.cfa), "--cfa")
     levels = layout.black_level
     black = None if levels is None else BlackLevels.stated(levels, cfa, "--black-level")
@@ -231,8 +221,6 @@ def _bare_frames(
         mean_dn, noise_dn = float(dn.mean()), _noise_dn(dn) if number >= len(paths) else 0.0
         same_dn = max(SAME_LIGHT * mean_dn, SAME_DN, SAME_DARK * noise_dn)
         frames.append(Frame(path, _iso_in(path), 0.0, mean_dn, same_dn))
-        if progress is not None:
-            progress(number + 1, len(paths) + len(dark))
     notes = []
     white = layout.white_level
     if white is None:
