@@ -153,6 +153,7 @@ CASES = [
     ("evaluate {0}/empty --model {0}/none", "empty"),
     ("demo -o {0}/out --photographs 99", "--photographs"),
     ("demo -o {0}/out --width 31", "width"),
+    ("demo -o {0}/out --width 320 --height 128", "need 130x130"),
 ]
 
 

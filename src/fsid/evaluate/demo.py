@@ -7,10 +7,8 @@ denoiser.
 
 from __future__ import annotations
 
-import dataclasses
 import io
 import json
-import os
 import shutil
 from collections.abc import Callable
 from contextlib import AbstractContextManager
@@ -48,7 +46,7 @@ from fsid.evaluate.models import model_method
 from fsid.evaluate.plots import loss_plot, noise_profile_plot
 from fsid.evaluate.report import Section, picture, write_report
 from fsid.evaluate.testset import photo_testset
-from fsid.sensor import NoiseLevel, develop, load_profile, read_mosaic, read_raw
+from fsid.sensor import develop, load_profile, read_raw
 
 PHOTOGRAPHS = (
     ("skimage", "data/astronaut.png"),
@@ -61,9 +59,6 @@ PHOTOGRAPHS = (
 CAMERA = "pixel6"
 ISOS = (800, 1600, 3200, 6400)
 CROP_LEVEL = "iso3200"
-
-REAL_RAW = Path("aisp_x90_3_4_512x512x4.npy")
-REAL_RAW_NOISE = NoiseLevel(k=(3.2e-4,) * 4, sigma2=(1e-6,) * 4)
 
 ProgressBar = Callable[[str, str], AbstractContextManager[Callable[[int, int], None]]]
 
@@ -95,6 +90,11 @@ def demo(out: Path, config: DemoConfig, bar: ProgressBar) -> Path:
             f"--scenes {config.scenes} --seed {config.seed}: at least 1 scene, and no negative seed"
         )
     generated, training = GenerateConfig(width=config.width, height=config.height), _training(config)
+    least = 2 * training.patch_px + 2
+    if min(config.width, config.height) < least:
+        raise FsidError(
+            f"--width {config.width} --height {config.height}: patches of the training need {least}x{least}"
+        )
     with claimed(out, config, "demo"):
         return _run(out, config, generated, training, bar)
 
@@ -116,7 +116,7 @@ def _run(
         comparison = compare(testset, [NOISY, CLASSICAL, ours], crop_levels=[CROP_LEVEL], progress=progress)
     write_results(comparison.rows, out / "results.json")
     report = out / "report.html"
-    sections = [*comparison_sections(comparison), *_chain_sections(out, ours), *_real_raw_section(ours)]
+    sections = [*comparison_sections(comparison), *_chain_sections(out, ours)]
     write_report(
         report, "FSID: trained on scenes, tested on photographs", _lead(config, comparison), sections
     )
@@ -207,25 +207,3 @@ def _pair_to_show(data: Path, window_px: int) -> tuple[Path, str]:
 
 def _preview(shard: Path, key: str) -> Image.Image:
     return Image.open(io.BytesIO(read_member(shard, f"{key}.rgb.png")))
-
-
-def _real_raw_section(ours: Method) -> list[Section]:
-    """A real phone RAW, where the folder of shared data is at hand; it has no truth, so it is for the eye."""
-    file = Path(os.environ.get("FSID_SHARED_DATA", "../shared/data")) / "raw" / REAL_RAW
-    if not file.exists():
-        return []
-    raw = read_mosaic(file, cfa="RGGB", black_level=0, white_level=4095)
-    raw = dataclasses.replace(raw, noise=REAL_RAW_NOISE)
-    window = np.s_[180:420, 600:1020]
-    noisy, denoised = (develop(each)[window] for each in (raw, ours.denoise(raw)))
-    return [
-        Section(
-            "A real phone RAW",
-            "A night photograph by a vivo X90 (sample of the AISP project), 12 bit, without a truth. "
-            f"No profile of this camera is known; k = {REAL_RAW_NOISE.k[0]:.1e} was read off the flat "
-            "parts of the frame.",
-            pictures=(
-                (picture(noisy, "as captured", pixelated=True), picture(denoised, "ours", pixelated=True)),
-            ),
-        )
-    ]
