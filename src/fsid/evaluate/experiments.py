@@ -189,7 +189,7 @@ def _check(out: Path, config: ExperimentConfig, bar: ProgressBar, workers: int) 
 
 
 def _check_noise(out: Path, config: ExperimentConfig) -> None:
-    """Before 16b339b trainings drew other noise than the camera's, and no two rivals may differ in that."""
+    """A run of an older FSID drew other noise than the camera's, and no two rivals may differ in that."""
     profiles = _training(config, config.seeds[0]).profiles
     for file in sorted((out / "runs").glob("*/config.yaml")):
         begun = load_settings(TrainConfig, file).profiles
