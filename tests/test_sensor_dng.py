@@ -108,6 +108,9 @@ def test_libraw_sees_the_same_picture(tmp_path, cfa, preview):
         ({"white_balance": (0.0, 1.0, 1.5)}, r"white_balance \(0\.0, 1\.0, 1\.5\)"),
         ({"white_balance": (2.0, 1.0, np.nan)}, "white_balance"),
         ({"white_balance": (2.0, 1.0)}, "white_balance"),
+        ({"xyz_to_camera": np.eye(2)}, "xyz_to_camera"),
+        ({"xyz_to_camera": np.full((3, 3), np.nan)}, "xyz_to_camera"),
+        ({"iso": np.nan}, "iso nan must be finite"),
     ],
 )
 def test_what_a_dng_does_not_hold_is_named(wrong, named, tmp_path):
@@ -115,6 +118,16 @@ def test_what_a_dng_does_not_hold_is_named(wrong, named, tmp_path):
     with pytest.raises(FsidError, match=f"Mine: .*{named}"):
         write_dng(tmp_path / "a.dng", replace(raw, **wrong))
     assert not list(tmp_path.iterdir())
+
+
+def test_numbers_of_numpy_are_stored_as_pythons_are(tmp_path):
+    raw = _raw()
+    level = NoiseLevel(np.array(raw.noise.k), np.array(raw.noise.sigma2))
+    write_dng(tmp_path / "python.dng", replace(raw, iso=800))
+    write_dng(tmp_path / "numpy.dng", replace(raw, iso=np.int64(800), noise=level))
+    assert (tmp_path / "numpy.dng").read_bytes() == (tmp_path / "python.dng").read_bytes()
+    write_dng(tmp_path / "single.dng", replace(raw, iso=np.float32(800)))
+    assert read_raw(tmp_path / "single.dng").iso == 800
 
 
 def test_tifffile_reads_the_tags(tmp_path):

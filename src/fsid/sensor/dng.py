@@ -56,7 +56,8 @@ def write_dng(target: str | Path | BinaryIO, raw: Raw, preview: np.ndarray | Non
 
     preview: (h, w, 3) uint8 sRGB, stored as the image that file managers show. Values outside the camera's
     0..white_level are clipped as the camera would. FsidError for what a DNG does not hold: NaN, a filter
-    pattern that is not Bayer, levels that are no whole DN, gains of a white balance that are 0 or infinite.
+    pattern that is not Bayer, levels that are no whole DN, gains of a white balance that are 0 or infinite,
+    a matrix that is not (3, 3).
     """
     data = _dng_bytes(raw, preview)
     if not isinstance(target, str | Path):
@@ -179,6 +180,10 @@ def _check_storable(raw: Raw) -> None:
     gains = raw.white_balance
     if len(gains) != 3 or not all(_LEAST_GAIN < gain < math.inf for gain in gains):
         raise FsidError(f"{raw.camera}: white_balance {gains} must be three finite gains above {_LEAST_GAIN}")
+    if np.shape(raw.xyz_to_camera) != (3, 3) or not np.all(np.isfinite(raw.xyz_to_camera)):
+        raise FsidError(f"{raw.camera}: xyz_to_camera {raw.xyz_to_camera} must be (3, 3) finite numbers")
+    if not math.isfinite(raw.iso):
+        raise FsidError(f"{raw.camera}: iso {raw.iso} must be finite, 0 where unknown")
 
 
 @dataclass(frozen=True)

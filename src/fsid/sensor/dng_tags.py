@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from fsid.config import to_plain
 from fsid.sensor.metadata import COLOUR_MATRICES, DATE_TAKEN, EXPOSURE_TIME, ORIENTATION, merged
 from fsid.sensor.raw import NoiseLevel, Raw
 from fsid.sensor.tiff import (
@@ -211,8 +212,8 @@ def camera_name(tags: Tags) -> str:
 def _private_data(raw: Raw) -> bytes:
     values: dict[str, Any] = {"iso": raw.iso}
     if raw.noise is not None:
-        values |= {"k": raw.noise.k, "sigma2": raw.noise.sigma2}
-    return _OWNER + json.dumps(values).encode("ascii")
+        values |= {"k": tuple(raw.noise.k), "sigma2": tuple(raw.noise.sigma2)}
+    return _OWNER + json.dumps(to_plain(values)).encode("ascii")
 
 
 def _private_numbers(tags: Tags) -> Any:
