@@ -1,4 +1,4 @@
-"""More stone: cobbles, ashlar, sandstone, slate, travertine, cracked earth, shingles, asphalt."""
+"""More stone: cobbles, ashlar, sandstone, slate, travertine, asphalt, shingles."""
 
 from __future__ import annotations
 

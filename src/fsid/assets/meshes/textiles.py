@@ -200,7 +200,7 @@ def flag(rng: np.random.Generator) -> Parts:
 
 @mesh_family("stuffed_toy")
 def stuffed_toy(rng: np.random.Generator) -> Parts:
-    """Sewn animal: plump body, head, ears, limbs, snout, button eyes, seams, perhaps a scarf."""
+    """Sewn animal: plump body, head, ears, limbs, snout, button eyes, perhaps a scarf."""
     body, head = rng.uniform(0.08, 0.13), rng.uniform(0.06, 0.1)
     ears, limb = rng.uniform(0.25, 1.3), rng.uniform(0.35, 0.5)
     soft = [ball(body, 3).stretched(1, 0.85, rng.uniform(1.0, 1.3)).at(z=1.1 * body)]

@@ -66,7 +66,7 @@ def bottle(rng: np.random.Generator) -> Parts:
 
 @mesh_family("glass")
 def glass(rng: np.random.Generator) -> Parts:
-    """Drinking glass: tumbler, stem glass or tankard, often with a drink in it."""
+    """Drinking glass: tumbler, plain or fluted, or stem glass, often with a drink in it."""
     height, radius, wall = rng.uniform(0.07, 0.16), rng.uniform(0.025, 0.045), rng.uniform(0.0015, 0.004)
     stemmed = rng.random() < 0.5
     stem = rng.uniform(0.04, 0.1) if stemmed else 0.0

@@ -66,13 +66,12 @@ def _laces(length: float, t: np.ndarray, high: np.ndarray, half: np.ndarray) -> 
 
 @mesh_family("hat")
 def hat(rng: np.random.Generator) -> Parts:
-    """Brimmed hat: crown with a dent, wavy brim, band; or a knitted cap with a bobble."""
+    """Brimmed hat: crown with a dent, wavy brim, band."""
     radius = rng.uniform(0.08, 0.1)
-    tall, brim = rng.uniform(0.07, 0.14), rng.uniform(1.3, 2.2)
+    tall, brim, _ = rng.uniform(0.07, 0.14), rng.uniform(1.3, 2.2), rng.random()
     s = np.linspace(0, 1, 14)
-    top = tall * (1 - 0.5 * rng.uniform(0, 1) * np.linspace(1, 0, 8) ** 2)
     crown = np.c_[radius * (1 - 0.25 * s**3), s * tall]
-    roof = np.c_[0.75 * radius * np.linspace(1, 0, 8), tall + (top - tall)[::-1] * 0]
+    roof = np.c_[0.75 * radius * np.linspace(1, 0, 8), np.full(8, tall)]
     thick = 0.0035
     out = [
         *np.c_[radius * brim * np.linspace(1, 0, 8)[:-1] + radius * np.linspace(0, 1, 8)[:-1], np.zeros(7)]
@@ -136,7 +135,7 @@ def bag(rng: np.random.Generator) -> Parts:
 
 @mesh_family("spectacles")
 def spectacles(rng: np.random.Generator) -> Parts:
-    """Spectacles: two rims of any shape with lenses, bridge, nose pads, folded or open temples."""
+    """Spectacles: two rims of any shape with lenses, bridge, folded or open temples."""
     wide, tall, power = rng.uniform(0.021, 0.029), rng.uniform(0.014, 0.026), rng.uniform(1.8, 4.5)
     wire, droop = rng.uniform(0.0008, 0.0026), rng.uniform(-0.25, 0.25)
     a = np.linspace(0, 2 * np.pi, 44, endpoint=False)
@@ -204,7 +203,7 @@ def umbrella(rng: np.random.Generator) -> Parts:
 
 @mesh_family("suitcase")
 def suitcase(rng: np.random.Generator) -> Parts:
-    """Travel case with ribs, straps, corners, handle, castors or locks."""
+    """Travel case with ribs, straps, handle, castors and locks."""
     x, y, z = rng.uniform(0.35, 0.6), rng.uniform(0.16, 0.26), rng.uniform(0.3, 0.55)
     soft = rng.uniform(0.01, 0.05)
     shell = [box(x, y, z, soft, 4).at(z=0.04)]
