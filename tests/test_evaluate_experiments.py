@@ -19,7 +19,7 @@ from fsid.config import read_yaml, save_settings
 from fsid.evaluate.claim import claimed
 from fsid.evaluate.compare import ImageRow
 from fsid.evaluate.dead_leaves import RADIUS_PX, dead_leaves_rand
-from fsid.evaluate.demo import DemoConfig
+from fsid.evaluate.demo import ISOS, DemoConfig
 from fsid.evaluate.experiment_report import gaps
 from fsid.evaluate.experiments import PHOTOGRAPHS, TEST_ISOS, _data, _training, scale_config
 from fsid.sensor import load_profile, save_profile
@@ -90,6 +90,27 @@ def test_a_demo_is_gone_on_with_by_the_same_command_alone(tmp_path: Path, capsys
         main(["demo", "-o", str(tmp_path), "--photographs", "2", "--scenes", "3", "--quiet"])
     assert stop.value.code == 2
     assert "these differ: scenes, photographs" in " ".join(capsys.readouterr().err.split())
+
+
+def test_the_demo_ends_in_a_report_and_makes_nothing_twice(tmp_path: Path):
+    command = ["demo", "-o", str(tmp_path), "--scenes", "1", "--steps", "2", "--photographs", "1", "--quiet"]
+    command += ["--width", "132", "--height", "130"]
+    main(command)
+    rows = json.loads((tmp_path / "results.json").read_text())
+    assert {row["model"] for row in rows} == {"noisy", "classical", "ours"}
+    assert {row["level"] for row in rows} == {f"iso{iso}" for iso in ISOS}
+    page = (tmp_path / "report.html").read_text()
+    for title in ("Scenes", "A training pair", "Noise", "Training"):
+        assert f">{title}</h2>" in page
+    assert (tmp_path / "overview.png").stat().st_size > 0
+
+    made = {
+        p: p.stat().st_mtime_ns for kind in ("data/*.tar", "testset/**/*.dng") for p in tmp_path.glob(kind)
+    }
+    assert {p.suffix for p in made} == {".tar", ".dng"}
+    main(command)
+    assert made == {p: p.stat().st_mtime_ns for p in made}
+    assert json.loads((tmp_path / "results.json").read_text()) == rows
 
 
 def test_folders_and_cameras_are_taken_as_named(photos: Path, tmp_path: Path):
