@@ -1,5 +1,7 @@
 """The contract of the sensor: Var(y) = k x + sigma2 per CFA site, mean x, and the camera's integers."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -154,6 +156,24 @@ def test_clean_levels_round_64_times_finer():
     fine = clean_levels(raw)
     assert (fine.black_level, fine.white_level) == (4096, 65472)
     assert np.max(np.abs(quantise(fine).mosaic - raw.mosaic)) <= 0.5001 / (64 * 959)
+    with pytest.raises(FsidError, match="white level 0 must be above 0"):
+        clean_levels(replace(raw, black_level=0, white_level=0))
+
+
+@pytest.mark.parametrize("kind", [np.uint16, np.int16, np.uint32])
+def test_levels_of_an_arrays_type_mean_what_they_say(kind: type):
+    """As `mosaic.max()` gives them: 959 * 959 does not fit into 16 bits, nor does twice 64 * 1023."""
+    raw = _flat(0.123456, side=4)
+    typed = replace(raw, black_level=kind(64), white_level=kind(1023))
+    level = NoiseLevel(k=(1e-4,) * 4, sigma2=(1e-6,) * 4)
+    noisy, expected = (noisy_from_clean(np.random.default_rng(0), r, 50, level) for r in (typed, raw))
+    np.testing.assert_array_equal(noisy.mosaic, expected.mosaic)
+    assert (clean_levels(typed).black_level, clean_levels(typed).white_level) == (4096, 65472)
+
+
+def test_equal_levels_are_no_scale():
+    with pytest.raises(FsidError, match="black level 64 is not below white level 64"):
+        from_dn(np.full((2, 2), 64, np.uint16), 64, 64)
 
 
 def test_level_rand_is_log_uniform_in_iso_and_scatters_around_the_profile():

@@ -173,7 +173,7 @@ def _dng_bytes(raw: Raw, preview: np.ndarray | None) -> bytes:
 def _check_storable(raw: Raw) -> None:
     check_cfa(raw.cfa, raw.camera)
     levels = raw.black_level, raw.white_level
-    if not all(isinstance(level, int | np.integer) for level in levels):
+    if not all(isinstance(level, int) for level in levels):
         raise FsidError(
             f"{raw.camera}: black and white level {levels} are not whole DN, as a DNG states them"
         )

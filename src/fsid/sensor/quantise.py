@@ -32,7 +32,9 @@ def to_dn(raw: Raw) -> np.ndarray:
 
 
 def from_dn(dn: np.ndarray, black_level: float, white_level: float) -> np.ndarray:
-    """Normalised float32 x of stored integers of any shape and type."""
+    """Normalised float32 x of stored integers of any shape and type. FsidError unless black < white."""
+    if not black_level < white_level:
+        raise FsidError(f"black level {black_level:g} is not below white level {white_level:g}")
     x = dn.astype(np.float32)
     x -= np.float32(black_level)
     x *= np.float32(1 / (white_level - black_level))
@@ -48,10 +50,11 @@ def clean_levels(raw: Raw) -> Raw:
     """The same image with levels scaled by the largest power of two that 16 bits hold (64..1023: by 64).
 
     A clean image stored with them is rounded to 1/64 of the camera's DN, which is far below its noise.
+    FsidError for a white level of 0 or below.
     """
-    scale = 1
-    while 2 * scale * raw.white_level <= MAX_DN:
-        scale *= 2
+    if not raw.white_level > 0:
+        raise FsidError(f"{raw.camera}: white level {raw.white_level:g} must be above 0")
+    scale = 1 << max(int(MAX_DN / float(raw.white_level)).bit_length() - 1, 0)
     return replace(raw, black_level=raw.black_level * scale, white_level=raw.white_level * scale)
 
 

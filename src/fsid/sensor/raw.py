@@ -47,6 +47,7 @@ class Raw:
     (the inverse of DNG `AsShotNeutral`).
     xyz_to_camera: (3, 3) DNG `ColorMatrix1` for D65, rows R, G, B.
     iso: 0 where unknown. noise: None where unknown. metadata: of the file it was read from.
+    NumPy's numbers become Python's: the square of a uint16 level would wrap around.
     Two are equal (==) where they are one and the same object; NumPy compares what they hold.
     FsidError for a mosaic of another shape, or of integers: `from_dn` makes x of DN.
     """
@@ -66,6 +67,9 @@ class Raw:
         check_even(self.mosaic.shape)
         if isinstance(self.mosaic, np.ndarray) and self.mosaic.dtype.kind != "f":
             raise FsidError(f"the mosaic holds {self.mosaic.dtype}; give x = (DN - black) / (white - black)")
+        for name in ("black_level", "white_level", "iso"):
+            if isinstance(number := getattr(self, name), np.generic):
+                object.__setattr__(self, name, number.item())
 
 
 def check_even(shape: tuple[int, ...]) -> None:
