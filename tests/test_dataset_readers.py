@@ -17,6 +17,7 @@ from fsid.dataset.card import _sources, _Tally
 from fsid.dataset.inspect import inspect
 from fsid.dataset.shards import read_records
 from fsid.dataset.statistics import TITLES
+from fsid.errors import FsidError
 
 SETTINGS = ["width=64", "height=48", "texture_size=64", "supersampling=1", "scene.objects=[1,3]"]
 
@@ -83,7 +84,7 @@ def test_a_card_is_written_when_all_is_there_and_only_then(data: Path) -> None:
     stored = shard.read_bytes()
     shard.unlink()
     config = load_settings(GenerateConfig, None, ())
-    with pytest.raises(Exception, match="already holds another dataset"):
+    with pytest.raises(FsidError, match="already holds another dataset"):
         generate(data, config, count=6, seed=2, shard_size=4)
     from fsid.config import from_plain, read_yaml
     from fsid.dataset import DatasetConfig
