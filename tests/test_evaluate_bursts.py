@@ -262,6 +262,8 @@ def test_a_fly_on_the_chart_is_an_outlier(clean: Raw, tmp_path: Path, frames: in
     error = np.abs(truth.mosaic - clean.mosaic)[20:30, 40:50].mean()
     assert error < 3 * quality.error
     assert quality.outliers > 0
+    inner = clean.mosaic < 0.9
+    assert quality.error == pytest.approx((truth.mosaic - clean.mosaic)[inner].std(), rel=0.15)
 
 
 def test_the_command_makes_a_set_that_evaluate_reads(clean: Raw, tmp_path: Path, capsys):

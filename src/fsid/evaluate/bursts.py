@@ -127,14 +127,18 @@ def average(
         raise too_few(reference, every)
     window = _common_window(placed, first)
     mean, variance = _moments(placed, window)
-    total, used = np.zeros(mean.shape), np.zeros(mean.shape)
+    used, total, square = (np.zeros(mean.shape) for _ in range(3))
     for x in _frames(placed, window):
-        kept = _is_like_the_others(x - mean, variance, len(placed))
-        total += np.where(kept, x, 0)
+        deviation = x - mean
+        kept = _is_like_the_others(deviation, variance, len(placed))
         used += kept
-    truth = np.where(used > 0, total / np.maximum(used, 1), mean).astype(np.float32)
+        total += np.where(kept, deviation, 0)
+        square += np.where(kept, deviation**2, 0)
+    change = total / np.maximum(used, 1)
+    truth = (mean + change).astype(np.float32)
+    spread = np.where(used > 1, (square - total * change) / np.maximum(used - 1, 1), variance)
     shared2 = float(np.mean([p.error2 for p in placed])) / 2
-    error = float(np.sqrt(np.mean(variance, dtype=np.float64) / len(placed) + shared2))
+    error = float(np.sqrt(np.mean(spread / np.maximum(used, 1)) + shared2))
     quality = TruthQuality(
         image=image,
         level=level,
