@@ -61,6 +61,8 @@ def test_synthetic_against_real_goes_on_where_it_was_stopped(photos: Path, tmp_p
     assert {"0.5lux", "5lux", "iso800", "iso6400"} <= {row["level"] for row in rows}
     page = (out / "report.html").read_text()
     assert "full - photographs" in page
+    assert "2 pairs of 128x96 pixels per source (from photographs 3 of up to 1024x1024)" in page
+    assert "network nafnet-tiny, 3 steps, seeds 3, camera pixel6, network.width=8, " in page
     assert "the paper&#39;s gap" in page
     by = {(r["model"], r["level"]): r["psnr"] for r in rows if r["set"] == "other"}
     gap = {iso: by["full-seed3", f"iso{iso}"] - by["photographs-seed3", f"iso{iso}"] for iso in TEST_ISOS}

@@ -9,7 +9,7 @@ sign in two seeds is real.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -33,12 +33,15 @@ PAPER_GAP = {"0.5lux": -0.40, "1lux": -0.74, "2lux": 0.01, "5lux": -0.14}
 def write_experiment_report(
     file: Path,
     config: ExperimentConfig,
-    sources: Sequence[str],
+    pairs: Mapping[str, int],
     rows: Sequence[Row],
     images: Sequence[ImageRow],
 ) -> Path:
-    """Gaps of "full" to its rivals, the means over seeds with their spread, and plots; one file."""
-    results = _Results(config.seeds, tuple(sources), tuple(rows), tuple(images))
+    """Gaps of "full" to its rivals, the means over seeds with their spread, and plots; one file.
+
+    pairs: how many every source has, in the order of the tables.
+    """
+    results = _Results(config.seeds, tuple(pairs), tuple(rows), tuple(images))
     materials = results.levels[ALL_SETS]
     common = [name for name in results.levels if name == ALL_SETS or results.levels[name] != materials]
     single = [name for name in results.levels if name not in common]
@@ -46,14 +49,25 @@ def write_experiment_report(
     if single:
         sections.append(_by_material(results, single))
     title = "FSID: ablation" if config.kind == "ablation" else "FSID: synthetic against real"
-    seeds = ", ".join(map(str, config.seeds))
-    lead = (
-        f"{config.count} pairs of {config.width}x{config.height} pixels per source, "
-        f"network {config.network}, {config.steps or 'its own number of'} steps, seeds {seeds}, "
-        f"camera {config.camera}."
-    )
-    write_report(file, title, lead, sections)
+    write_report(file, title, _lead(config, pairs), sections)
     return file
+
+
+def _lead(config: ExperimentConfig, pairs: Mapping[str, int]) -> str:
+    """What was compared; sources whose data differ are named."""
+    data = {source: (count, *config.frame_px(source)) for source, count in pairs.items()}
+    count, width, height = data["full"]
+    others = "".join(
+        f" (from {source} {n} of up to {w}x{h})"
+        for source, (n, w, h) in data.items()
+        if (n, w, h) != data["full"]
+    )
+    settings = "".join(f", {setting}" for setting in (*config.settings, *config.train_settings))
+    return (
+        f"{count} pairs of {width}x{height} pixels per source{others}, network {config.network}, "
+        f"{config.steps or 'its own number of'} steps, seeds {', '.join(map(str, config.seeds))}, "
+        f"camera {config.camera}{settings}."
+    )
 
 
 def gaps(

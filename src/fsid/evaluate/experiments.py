@@ -111,6 +111,11 @@ class ExperimentConfig:
             if names.count(name) > 1:
                 raise FsidError(f"--test {folder}: another test set is called {name}, too; rename the folder")
 
+    def frame_px(self, source: str) -> tuple[int, int]:
+        """Width and height of the frames of a source; photographs have them at most."""
+        least = _PHOTOGRAPH_PX if source == PHOTOGRAPHS else 0
+        return max(self.width, least), max(self.height, least)
+
 
 def scale_config(kind: Kind, scale: str) -> ExperimentConfig:
     """The settings of a scale: "smoke" (minutes), "cpu" (hours on two cores), "paper" (175,000 pairs)."""
@@ -165,7 +170,8 @@ def _run(out: Path, config: ExperimentConfig, bar: ProgressBar, workers: int) ->
             images += new_images
     write_results(rows, out / "results.json")
     write_images(images, out / "images.csv")
-    return write_experiment_report(out / "report.html", config, SOURCES[config.kind], rows, images)
+    pairs = {source: _count(config, source) for source in SOURCES[config.kind]}
+    return write_experiment_report(out / "report.html", config, pairs, rows, images)
 
 
 def _check(out: Path, config: ExperimentConfig, bar: ProgressBar, workers: int) -> None:
@@ -216,12 +222,8 @@ def _count(config: ExperimentConfig, source: str) -> int:
 
 
 def _generator(out: Path, config: ExperimentConfig, source: str) -> GenerateConfig:
-    least = _PHOTOGRAPH_PX if source == PHOTOGRAPHS else 0
-    overrides: list[Override] = [
-        ("width", max(config.width, least)),
-        ("height", max(config.height, least)),
-        ("cameras", [config.camera]),
-    ]
+    width, height = config.frame_px(source)
+    overrides: list[Override] = [("width", width), ("height", height), ("cameras", [config.camera])]
     if source in VARIANTS:
         overrides += [("variant", source), *config.settings]
     else:
