@@ -171,11 +171,12 @@ def test_rivals_trained_on_the_noise_of_other_cameras_are_not_gone_on_with(tmp_p
         (["ablation", "--test", "."], "holds no photograph"),
         (["ablation", "--test", "a/val", "b/val"], "another test set is called val"),
         (["ablation", "--test", "materials"], "another test set is called materials"),
+        (["ablation", "--test", "fabric"], "another test set is called fabric"),
     ],
 )
 def test_bad_input_is_one_line(tmp_path: Path, arguments: list[str], words: str, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    for folder in ("a/val", "b/val", "materials"):
+    for folder in ("a/val", "b/val", "materials", "fabric"):
         (tmp_path / folder).mkdir(parents=True)
     with pytest.raises(SystemExit) as stop:
         main(["experiment", *arguments, "-o", str(tmp_path / "out"), "--quiet"])

@@ -46,6 +46,7 @@ from fsid.evaluate.dead_leaves import write_dead_leaves
 from fsid.evaluate.experiment_report import write_experiment_report
 from fsid.evaluate.models import model_method
 from fsid.evaluate.simulated import LUXES, simulated_testset
+from fsid.evaluate.testbench import MATERIALS
 from fsid.evaluate.testset import ALL_SETS, levels_of, photo_testset, read_testset
 from fsid.scene import VARIANTS
 from fsid.sensor import load_bayer_profile
@@ -106,9 +107,9 @@ class ExperimentConfig:
         for key in (setting.partition("=")[0] for setting in self.settings):
             if key.partition(".")[0] in _NOT_OF_SCENES:
                 raise FsidError(f"--set {key}: is no setting of the scenes alone; rivals share all others")
-        names = [MATERIALS_SET, ALL_SETS, *(_set_name(folder) for folder in self.tests)]
-        for folder, name in zip(self.tests, names[2:], strict=True):
-            if names.count(name) > 1:
+        names = [MATERIALS_SET, ALL_SETS, *MATERIALS, *map(_set_name, self.tests)]
+        for folder in self.tests:
+            if names.count(name := _set_name(folder)) > 1:
                 raise FsidError(f"--test {folder}: another test set is called {name}, too; rename the folder")
 
     def frame_px(self, source: str) -> tuple[int, int]:
