@@ -78,6 +78,7 @@ def test_the_truth_is_exposed_as_the_cameras_meter_would(tmp_path: Path, monkeyp
         (["--material", "wood"], "wood: no such material"),
         (["--frames", "0"], "--frames 0"),
         (["--width", "33"], "--width 33"),
+        (["--width", "102400"], "numbers of 64 to 8192"),
         (["--lux", "-1"], "at least one positive"),
         (["folder"], "takes no folder"),
     ],

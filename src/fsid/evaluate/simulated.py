@@ -22,6 +22,8 @@ from fsid.sensor.light import GREY, KEY
 
 LUXES = (0.5, 1.0, 2.0, 5.0)
 """The light levels of the paper."""
+_LARGEST_PX = 8192
+"""A megapixel takes 0.65 GB to draw."""
 
 
 def simulated_testset(
@@ -50,8 +52,8 @@ def simulated_testset(
         raise FsidError(f"{sorted(unknown)[0]}: no such material; choose from {', '.join(MATERIALS)}")
     if not (1 <= frames <= 100 and scenes >= 1):
         raise FsidError(f"--frames {frames}: 1 to 100 are possible, and --scenes must be at least 1")
-    if min(width, height) < 64 or width % 2 or height % 2:
-        raise FsidError(f"--width {width} --height {height}: give even numbers of at least 64 pixels")
+    if min(width, height) < 64 or max(width, height) > _LARGEST_PX or width % 2 or height % 2:
+        raise FsidError(f"--width {width} --height {height}: give even numbers of 64 to {_LARGEST_PX} pixels")
     testset = TestSet(
         camera=profile.name,
         levels=tuple(levels),
