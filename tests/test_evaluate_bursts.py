@@ -70,6 +70,18 @@ def test_the_error_of_the_truth_is_what_it_says(clean: Raw, tmp_path: Path):
     assert psnr(truth.mosaic, clean.mosaic) > psnr(read_raw(paths[0]).mosaic, clean.mosaic) + 9
 
 
+@pytest.mark.parametrize("tiles", [0.05, 0.12])
+def test_a_first_frame_beside_the_others_limits_the_truth(clean: Raw, tmp_path: Path, tiles: float):
+    beside = replace(clean, mosaic=shifted(clean.mosaic, tiles))
+    paths = _burst(
+        tmp_path / "b", clean, lambda raw, f: raw if f else replace(raw, mosaic=beside.mosaic), 400
+    )
+    truth, quality, _ = average(paths[1:], paths[0])
+    assert quality.left_out == 0
+    assert quality.psnr == pytest.approx(psnr(truth.mosaic, beside.mosaic), abs=1)
+    assert quality.psnr < psnr(truth.mosaic, clean.mosaic) - 3
+
+
 def test_flicker_is_divided_out(clean: Raw, tmp_path: Path):
     flicker = 1 + 0.08 * np.sin(np.arange(FRAMES) * 2.0)
     flicker[0] = 1

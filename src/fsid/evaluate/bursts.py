@@ -1,15 +1,17 @@
 """A test set from captures: the truth is the robust mean of a burst, with its own error bar.
 
     truth = mean_f clip((x_f - o_f) / g_f),         clip: within 4 sigma of the first mean
-    error^2 = sigma^2 / F + error^2(g, o) / 2       the half that all frames share: the first frame's noise
+    error^2 = sigma^2 / F + error^2(g, o) / 2 + |T truth - truth|^2
+                                                    half of the second: the noise of the first frame
 
     CAPTURES/<scene>/<level>/*.dng        one burst each: static scene, locked focus, exposure and ISO
 
 The first frame of a burst is the noisy test frame and stays out of the truth, else its noise would be the
 truth's, too; further ones are the first that lie on it in the same light. g_f is the flicker of the light,
 o_f the drift of the black level; a frame that moved is shifted back where the shift is a whole number of CFA
-tiles (`placing`), and left out where it is not, since interpolating would blur the truth. Truth and noisy
-frames are cut to what all frames show.
+tiles (`placing`), and left out where it is not, since interpolating would blur the truth. What is left, less
+than a sixth of a tile, the first frame may lie beside all others: T would move the truth onto it. Truth and
+noisy frames are cut to what all frames show.
 """
 
 from __future__ import annotations
@@ -21,10 +23,10 @@ from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
-from scipy.ndimage import uniform_filter
+from scipy.ndimage import shift, uniform_filter
 
 from fsid.errors import FsidError
-from fsid.evaluate.placing import LEAST_FRAMES, Placed, Window, place, read_first, too_few
+from fsid.evaluate.placing import LEAST_FRAMES, Placed, Window, green, misplaced, place, read_first, too_few
 from fsid.evaluate.testset import Progress, TestImage, TestSet, staged, write_testset
 from fsid.files import write_atomically
 from fsid.sensor import (
@@ -34,6 +36,7 @@ from fsid.sensor import (
     estimate_noise,
     exact_levels,
     load_profile,
+    pack,
     read_raw,
     write_dng,
 )
@@ -137,8 +140,10 @@ def average(
     change = total / np.maximum(used, 1)
     truth = (mean + change).astype(np.float32)
     spread = np.where(used > 1, (square - total * change) / np.maximum(used - 1, 1), variance)
+    noise2 = float(np.mean(spread / np.maximum(used, 1)))
     shared2 = float(np.mean([p.error2 for p in placed])) / 2
-    error = float(np.sqrt(np.mean(spread / np.maximum(used, 1)) + shared2))
+    result = replace(_cut(first, window), mosaic=truth, noise=None)
+    error = float(np.sqrt(noise2 + shared2 + _misplacement2(result, _cut(first, window))))
     quality = TruthQuality(
         image=image,
         level=level,
@@ -150,7 +155,17 @@ def average(
         flicker=max(abs(p.gain - 1) for p in placed),
         shift_px=float(max(np.hypot(*p.roll) for p in placed)),
     )
-    return replace(_cut(first, window), mosaic=truth, noise=None), quality, window
+    return result, quality, window
+
+
+def _misplacement2(truth: Raw, first: Raw) -> float:
+    """Mean square of what lies between the truth and the first frame because it moved by a part of a tile."""
+    tiles = misplaced(green(truth), green(first))
+    planes, seen = (pack(raw.mosaic, raw.cfa) for raw in (truth, first))
+    moved = np.stack([shift(plane, -tiles, order=3, mode="nearest") for plane in planes]) - planes
+    square = float(np.mean(moved**2, dtype=np.float64))
+    share = float(np.mean(moved * (seen - planes), dtype=np.float64)) / max(square, 1e-30)
+    return square * min(max(share, 0.0), 1.0) ** 2
 
 
 def _find_bursts(captures: Path, frames: int) -> dict[tuple[str, str], list[Path]]:

@@ -76,7 +76,7 @@ def read_first(path: Path) -> Raw:
     """The first frame of a burst, with which all others are compared; FsidError where it shows no picture."""
     first = read_raw(path)
     span = first.white_level - first.black_level
-    if _green(first).mean() * span < LEAST_LIGHT_DN:
+    if green(first).mean() * span < LEAST_LIGHT_DN:
         raise FsidError(f"{path}: shows no light, the first frame of its burst; expose longer, or remove it")
     if (share := float(np.mean(first.mosaic >= 1 - 0.5 / span))) > MOST_SATURATED:
         raise FsidError(
@@ -117,7 +117,7 @@ def place(path: Path, first: Raw) -> Placed:
         raise FsidError(f"{path}: size or CFA differs from the other frames of the burst")
     if raw.iso != first.iso:
         raise FsidError(f"{path}: ISO {raw.iso:g} differs from ISO {first.iso:g} of the burst's first frame")
-    ours, theirs = (_green(r) for r in (raw, first))
+    ours, theirs = (green(r) for r in (raw, first))
     brightness = float(ours.sum() / theirs.sum())
     whole, rest = shift_between(ours - (ours.mean() - theirs.mean()), theirs)
     gain, offset, error2 = _light(whole, ours, theirs, first.white_level - first.black_level)
@@ -192,17 +192,32 @@ def _brings_nearer(whole: np.ndarray, ours: np.ndarray, theirs: np.ndarray) -> b
 def _lies_beside(ours: np.ndarray, theirs: np.ndarray) -> bool:
     """Whether a small shift explains, beyond noise, how two planes (h, w) of like light differ.
 
-    ours - theirs = -shift . gradient + noise: the correlation with the gradient, less what of it looks like
-    another light, has the error that the differences themselves tell (White 1980).
+    The correlation of the difference with the gradient has the error that the differences themselves tell
+    (White 1980).
+    """
+    slopes, change = _less_light(ours - theirs, theirs)
+    scores = slopes * change
+    total = scores.sum(axis=0)
+    return bool(total @ np.linalg.pinv(scores.T @ scores) @ total > SIGNIFICANT**2)
+
+
+def misplaced(ours: np.ndarray, theirs: np.ndarray) -> np.ndarray:
+    """Rows and columns, parts of one, by which `ours` lies further than `theirs`; (h, w) of like light."""
+    slopes, change = _less_light(uniform_filter(ours - theirs, 3), theirs)
+    return -np.linalg.lstsq(slopes, change, rcond=None)[0].ravel()
+
+
+def _less_light(change: np.ndarray, theirs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The smoothed gradient of `theirs` (h w, 2) and its `change` (h w, 1): -shift . gradient + noise.
+
+    What of both looks like another light is taken out.
     """
     smooth = uniform_filter(theirs.astype(np.float64), 3)
     slopes = np.stack([_unbanded(slope).ravel() for slope in np.gradient(smooth)], axis=1)
     light = _unbanded(smooth).reshape(-1, 1)
-    change = _unbanded(ours - theirs).reshape(-1, 1)
-    slopes, change = (v - light @ np.linalg.lstsq(light, v, rcond=None)[0] for v in (slopes, change))
-    scores = slopes * change
-    total = scores.sum(axis=0)
-    return bool(total @ np.linalg.pinv(scores.T @ scores) @ total > SIGNIFICANT**2)
+    both = (slopes, _unbanded(change).reshape(-1, 1))
+    slopes, change = (v - light @ np.linalg.lstsq(light, v, rcond=None)[0] for v in both)
+    return slopes, change
 
 
 def _unbanded(plane: np.ndarray) -> np.ndarray:
@@ -213,7 +228,7 @@ def _unbanded(plane: np.ndarray) -> np.ndarray:
     return plane - plane.mean(axis=1, keepdims=True) - plane.mean(axis=0) + plane.mean()
 
 
-def _green(raw: Raw) -> np.ndarray:
+def green(raw: Raw) -> np.ndarray:
     """(H/2, W/2) mean of the greens."""
     packed = pack(raw.mosaic, raw.cfa)
     return (packed[1] + packed[2]) / 2
