@@ -121,3 +121,16 @@ def test_without_a_terminal_a_line_a_minute_says_how_far_it_is(
                 bar(int(clock.now // 10), 20)
         lines = [line for line in capsys.readouterr().err.splitlines() if line.startswith("pairs: ")]
         assert lines == ([] if quiet else told)
+
+
+def test_a_bar_gets_shorter_where_its_terminal_is_narrow_and_its_figures_do_not(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    clock = Clock()
+    monkeypatch.setattr(progress, "Pace", lambda: Pace(clock))
+    with progress.progress_bar("checking my photographs", "pictures", quiet=False) as bar:
+        bar(0, 1000)
+        clock.now = 10.0
+        bar(999, 1000)
+    assert "999/1000 99.9 pictures/s, 0:00:00 left" in capsys.readouterr().err

@@ -33,6 +33,7 @@ from fsid.denoise import (  # noqa: E402
     NetworkConfig,
     TrainConfig,
     denoise_raw,
+    live,
     load_denoiser,
     load_history,
     train,
@@ -45,6 +46,7 @@ from fsid.denoise.train import _prepare, _step, learning_rate, noise_left  # noq
 from fsid.denoise.validate import Validation, _captures, held_out, validation  # noqa: E402
 from fsid.errors import FsidError  # noqa: E402
 from fsid.files import held  # noqa: E402
+from fsid.pace import Pace  # noqa: E402
 from fsid.sensor import Raw, add_noise, clean_levels, load_profile, write_dng  # noqa: E402
 
 CONFIG = TrainConfig(
@@ -307,6 +309,20 @@ def test_progress_replaces_the_live_line_and_quiet_is_silent(
     shown = "".join(capfd.readouterr())
     assert "8/8" in shown
     assert "PSNR" not in shown
+
+
+def test_a_training_says_its_step_in_a_terminal_of_eighty_columns(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    times = iter((0.0, *(100.0,) * 9))
+    monkeypatch.setattr(live, "Pace", lambda: Pace(lambda: next(times)))
+    with live.LiveLine(replace(CONFIG, steps=100_000), 0, 1, quiet=False) as line:
+        line.validated(48.18)
+        line.update(12_345, 0.233, 48.96)
+    shown = capsys.readouterr().err
+    assert "12345/100000 PSNR 48.96 dB held out 48.18 dB" in shown
+    assert "patches/s, 0:11:50 left" in shown
 
 
 @pytest.mark.parametrize(

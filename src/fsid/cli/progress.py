@@ -10,6 +10,7 @@ from contextlib import contextmanager
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TaskID, TextColumn
+from rich.table import Column
 from rich.text import Text
 
 from fsid.pace import Pace
@@ -17,7 +18,7 @@ from fsid.pace import Pace
 
 class _Speed(ProgressColumn):
     def __init__(self, pace: Pace, unit: str) -> None:
-        super().__init__()
+        super().__init__(Column(no_wrap=True))
         self._pace, self._unit = pace, unit
 
     def render(self, task: Task) -> Text:
@@ -57,7 +58,7 @@ def progress_bar(label: str, unit: str, *, quiet: bool) -> Iterator[Bar]:
     columns = (
         TextColumn("{task.description}", markup=False),
         BarColumn(),
-        MofNCompleteColumn(),
+        MofNCompleteColumn(table_column=Column(no_wrap=True)),  # where it is narrow, the bar is shorter
         _Speed(pace, unit),
         TextColumn("[yellow]{task.fields[failures]}"),
     )
@@ -66,4 +67,5 @@ def progress_bar(label: str, unit: str, *, quiet: bool) -> Iterator[Bar]:
     try:
         yield Bar(bar, task, unit, pace)
     finally:
-        bar.stop()
+        if bar.live.is_started:
+            bar.stop()

@@ -9,26 +9,30 @@ from types import TracebackType
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+from rich.table import Column
 
 from fsid.denoise.train_config import TrainConfig
 from fsid.pace import Pace
 
 _SMOOTHING = 0.05  # of the shown loss and PSNR, which jump from batch to batch
+_WIDE = 100  # columns of a terminal that has room for a bar and the loss
 
 
 class LiveLine:
     """Context manager; nothing is shown where `quiet`."""
 
     def __init__(self, config: TrainConfig, step: int, processes: int, *, quiet: bool) -> None:
+        console = Console(stderr=True, quiet=quiet)
+        self._is_wide = console.width >= _WIDE
         columns = (
             TextColumn("train"),
-            BarColumn(bar_width=20),
-            MofNCompleteColumn(),
+            *((BarColumn(bar_width=20),) if self._is_wide else ()),
+            MofNCompleteColumn(table_column=Column(no_wrap=True)),
             TextColumn("{task.fields[figures]}"),
             TextColumn("{task.fields[held_out]}"),
             TextColumn("{task.fields[rate]}"),
         )
-        self._progress = Progress(*columns, console=Console(stderr=True, quiet=quiet), disable=quiet)
+        self._progress = Progress(*columns, console=console, disable=quiet)
         self._task = self._progress.add_task(
             "train", total=config.steps, completed=step, figures="", rate="", held_out=""
         )
@@ -53,10 +57,11 @@ class LiveLine:
         self._shown = loss, psnr
         self._pace.update(step, self._steps)
         rate = f"{self._pace.rate * self._batch:.0f} patches/s, {self._pace.left} left"
-        figures = f"loss {loss:.3f}  PSNR {psnr:.2f} dB"
-        self._progress.update(self._task, completed=step, figures=figures, rate=rate)
+        told = f"PSNR {psnr:.2f} dB"
+        full = f"loss {loss:.3f}  {told}"
+        self._progress.update(self._task, completed=step, figures=full if self._is_wide else told, rate=rate)
         if not self._progress.console.is_terminal and self._pace.line_due():
-            self._progress.console.print(f"train: {step}/{self._steps}  {figures}  {rate}", soft_wrap=True)
+            self._progress.console.print(f"train: {step}/{self._steps}  {full}  {rate}", soft_wrap=True)
 
     def validated(self, psnr: float) -> None:
         """PSNR in dB on the held-out scenes."""
