@@ -134,3 +134,12 @@ def test_a_bar_gets_shorter_where_its_terminal_is_narrow_and_its_figures_do_not(
         clock.now = 10.0
         bar(999, 1000)
     assert "999/1000 99.9 pictures/s, 0:00:00 left" in capsys.readouterr().err
+
+
+def test_a_help_breaks_lines_where_its_terminal_does(capsys: pytest.CaptureFixture[str]) -> None:
+    """And not where the source does."""
+    with pytest.raises(SystemExit):
+        cli.main(["evaluate", "--help"])
+    text = capsys.readouterr().out
+    assert "images.csv (every image) and report.html (tables, plot, before and after, error maps)." in text
+    assert "network (nafnet-small); may be given several times" in text

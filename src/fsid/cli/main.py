@@ -5,11 +5,13 @@ from __future__ import annotations
 import errno
 import io
 import os
+import re
 import select
 import signal
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from inspect import cleandoc
 from types import FrameType
 from typing import NoReturn, TextIO
 
@@ -109,6 +111,8 @@ def _terminate(number: int, frame: FrameType | None) -> None:
 def _run(arguments: Sequence[str] | None) -> None:
     try:
         _check_repeated(sys.argv[1:] if arguments is None else arguments)
+        for command in COMMANDS.values():
+            command.__doc__ = _flowing(command.__doc__ or "")
         tyro.extras.subcommand_cli_from_dict(
             COMMANDS,
             prog="fsid",
@@ -139,6 +143,11 @@ def _run(arguments: Sequence[str] | None) -> None:
         hint = "; the same command goes on from what is finished" if goes_on else ""
         Console(stderr=True).print(f"fsid: {what}{hint}")
         sys.exit(code)
+
+
+def _flowing(docstring: str) -> str:
+    """With every paragraph and every argument on one line: the help breaks lines where its terminal does."""
+    return re.sub(r"(?<!\n)\n(?: {8}|(?=\S))", " ", cleandoc(docstring))
 
 
 def _is_read(stream: TextIO) -> bool:

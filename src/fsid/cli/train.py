@@ -34,7 +34,8 @@ def train(
         data: Folder made by fsid generate.
         output: Folder of the run.
         config: YAML file of settings, or the name of a built-in one: nafnet-tiny (CPU, minutes),
-            nafnet-small (1 M parameters, phone class; CPU, an hour or two), nafnet-32, nafnet-64 (GPU).
+            nafnet-small (1 M parameters, phone class; CPU, an hour or two), nafnet-32, nafnet-64 (GPU), paper
+            (eight GPUs).
         set: Single settings, for example --set steps=20000 batch=16 learning_rate=1e-3.
         resume: Continue the training in the folder with the settings that it has there.
         quiet: No progress line.
