@@ -212,6 +212,16 @@ def test_hidden_files_are_no_photographs(photos, tmp_path):
     assert inspect(tmp_path).pictures == 1
 
 
+def test_pictures_in_folders_inside_a_folder_are_pointed_at(photos, tmp_path):
+    (tmp_path / "2024" / "may").mkdir(parents=True)
+    (tmp_path / ".thumbnails").mkdir()
+    for place in (tmp_path / ".thumbnails", tmp_path / "2024" / "may"):
+        shutil.copy(photos / "0.png", place)
+    for find in (find_photos, find_pictures):
+        with pytest.raises(FsidError, match=r"2024/may/0\.png lies deeper, give its folder"):
+            find(tmp_path)
+
+
 def test_halves_of_few_pictures_are_no_yardstick(photos, monkeypatch, capsys):
     """Two halves of one collection differ by chance alone: a small reference makes everything look real."""
     few = inspect(photos, photos)

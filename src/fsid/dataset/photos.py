@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import struct
 from pathlib import Path
 
@@ -27,7 +28,8 @@ def find_photos(folder: str | Path) -> list[Path]:
         raise FsidError(f"{folder}: is not a folder of photographs")
     photos = files_inside(folder, PHOTO_SUFFIXES)
     if not photos:
-        raise FsidError(f"{folder}: holds no photograph ({', '.join(PHOTO_SUFFIXES)})")
+        where = deeper(folder, PHOTO_SUFFIXES)
+        raise FsidError(f"{folder}: holds no photograph ({', '.join(PHOTO_SUFFIXES)}){where}")
     return photos
 
 
@@ -35,6 +37,16 @@ def files_inside(folder: Path, suffixes: tuple[str, ...]) -> list[Path]:
     """The files directly inside `folder` that end so, sorted; hidden ones ("._a.jpg" of macOS) left out."""
     files = (path for path in folder.iterdir() if not path.name.startswith("."))
     return sorted(path for path in files if path.suffix.lower() in suffixes)
+
+
+def deeper(folder: Path, suffixes: tuple[str, ...]) -> str:
+    """In words, where a folder inside `folder` holds such files; "" where none does."""
+    for below, subfolders, names in os.walk(folder):
+        subfolders[:] = sorted(name for name in subfolders if not name.startswith("."))
+        for name in sorted(names):
+            if not name.startswith(".") and name.lower().endswith(suffixes):
+                return f"; {os.path.join(below, name)} lies deeper, give its folder"
+    return ""
 
 
 def read_photo(path: str | Path) -> np.ndarray:

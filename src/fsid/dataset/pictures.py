@@ -15,7 +15,14 @@ from pathlib import Path
 
 import numpy as np
 
-from fsid.dataset.photos import PHOTO_SUFFIXES, SMALLEST_PX, check_photo, files_inside, read_photo
+from fsid.dataset.photos import (
+    PHOTO_SUFFIXES,
+    SMALLEST_PX,
+    check_photo,
+    deeper,
+    files_inside,
+    read_photo,
+)
 from fsid.errors import FsidError
 
 EXR_SUFFIX = ".exr"
@@ -42,7 +49,7 @@ def find_pictures(folder: Path) -> list[Path]:
     suffixes = (*PHOTO_SUFFIXES, EXR_SUFFIX)
     pictures = files_inside(folder, suffixes)
     if not pictures:
-        raise FsidError(f"{folder}: holds no picture ({', '.join(suffixes)})")
+        raise FsidError(f"{folder}: holds no picture ({', '.join(suffixes)}){deeper(folder, suffixes)}")
     return pictures
 
 
