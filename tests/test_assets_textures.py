@@ -165,6 +165,20 @@ def test_the_colour_may_have_the_names_of_painting_programs(tmp_path, colour, si
     assert bake_material(f"file:{tmp_path}", 0, 64).roughness.mean() == pytest.approx(0.3, abs=0.01)
 
 
+@pytest.mark.parametrize("normal", ["Normal_OpenGL", "normal-ogl"])
+def test_the_maps_of_painting_programs_are_those_of_the_set(tmp_path, normal):
+    height, encoded = hill()
+    save(tmp_path / "crate_BaseColor.png", picture())
+    save(tmp_path / f"crate_{normal}.png", encoded)
+    save(tmp_path / "crate_Metallic.png", np.full((SIZE, SIZE), 1.0))
+    save(tmp_path / "crate_Height.png", np.uint16(65535 * np.clip(0.5 + 9 * height, 0, 1)))
+    assert not survey_textures(str(tmp_path)).skipped
+    maps = bake_material(f"file:{tmp_path}", 0, SIZE)
+    assert maps.metallic.min() == 1
+    assert np.corrcoef(maps.height.ravel(), height.ravel())[0, 1] > 0.999
+    assert maps.relief_m == pytest.approx(np.ptp(height) * TILE_M, rel=0.05)
+
+
 def test_pictures_of_no_set_are_listed_with_the_reason(folder):
     usable = texture_sources(folder)
     survey_textures.cache_clear()

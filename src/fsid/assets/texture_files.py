@@ -3,10 +3,11 @@
     ambientCG    Bricks001_1K-JPG_Color.jpg   _NormalGL _NormalDX _Roughness _Metalness _Displacement
     Poly Haven   rock_wall_diff_1k.jpg        _nor_gl_ _nor_dx_ _rough_ _metal_ _disp_ _arm_
 
-In both, the colour may also be called BaseColor, Base_Color or Albedo, as painting programs call it. Maps of
-data (all but the colour and the packed one) may be OpenEXR, as in the archives of Poly Haven. Images come
-from the internet: a header may promise any size and data may end anywhere. What a header says is compared
-with the limits before a pixel is read, and only formats with a well-tested decoder are read.
+In both, the colour may also be called BaseColor, Base_Color or Albedo, as painting programs call it, and in
+the first kind their other maps Normal_OpenGL (Normal-OGL), Normal_DirectX (Normal-DX), Metallic and Height.
+Maps of data (all but the colour and the packed one) may be OpenEXR, as in the archives of Poly Haven. Images
+come from the internet: a header may promise any size and data may end anywhere. What a header says is
+compared with the limits before a pixel is read, and only formats with a well-tested decoder are read.
 """
 
 from __future__ import annotations
@@ -29,8 +30,8 @@ MAX_PIXELS = 8192 * 8192
 EXR_SUFFIX = ".exr"
 _SUFFIXES = r"(?P<suffix>\.(?:jpe?g|png|exr))"
 _AMBIENT_CG = re.compile(
-    r"(?P<set>.+?)_(?P<map>color|base_?color|albedo|normalgl|normaldx|roughness|metalness|displacement"
-    r"|ambientocclusion|opacity|emission)" + _SUFFIXES,
+    r"(?P<set>.+?)_(?P<map>color|base_?color|albedo|normal(?:gl|_opengl|-ogl)|normal(?:dx|_directx|-dx)|roughness"
+    r"|metalness|metallic|displacement|height|ambientocclusion|opacity|emission)" + _SUFFIXES,
     re.IGNORECASE,
 )
 _POLY_HAVEN = re.compile(
@@ -42,11 +43,11 @@ _PICTURE = re.compile(r"(?P<stem>.+)\.(?:jpe?g|png|exr|tiff?|tga|webp|bmp)", re.
 _NEVER_EXR = ("colour", "arm")
 _ROLES = {
     **dict.fromkeys(("color", "basecolor", "base_color", "diff", "diffuse", "col", "albedo"), "colour"),
-    **dict.fromkeys(("normalgl", "nor_gl"), "normal_gl"),
-    **dict.fromkeys(("normaldx", "nor_dx"), "normal_dx"),
+    **dict.fromkeys(("normalgl", "normal_opengl", "normal-ogl", "nor_gl"), "normal_gl"),
+    **dict.fromkeys(("normaldx", "normal_directx", "normal-dx", "nor_dx"), "normal_dx"),
     **dict.fromkeys(("roughness", "rough"), "roughness"),
-    **dict.fromkeys(("metalness", "metal"), "metallic"),
-    **dict.fromkeys(("displacement", "disp"), "height"),
+    **dict.fromkeys(("metalness", "metallic", "metal"), "metallic"),
+    **dict.fromkeys(("displacement", "height", "disp"), "height"),
     "arm": "arm",
 }
 """Of the maps that are read; the others have known names, too."""
