@@ -110,7 +110,7 @@ def _exr(path: Path, width: int, height: int, names: str = "RGB") -> None:
 
 
 def test_skies_come_from_a_folder(tmp_path: Path):
-    """What is no panorama is left out with its reason, and never ends a run."""
+    """And its subfolders; what is no panorama is left out with its reason, and never ends a run."""
     (tmp_path / "dawn.hdr").write_bytes(_radiance_header(64, 32))
     _exr(tmp_path / "noon.EXR", 64, 32)
     (tmp_path / "notes.txt").touch()
@@ -121,15 +121,16 @@ def test_skies_come_from_a_folder(tmp_path: Path):
     (tmp_path / "wide.hdr").write_bytes(_radiance_header(64, 33))
     (tmp_path / "huge.hdr").write_bytes(_radiance_header(32770, 16385))
     (tmp_path / "empty.hdr").touch()
-    (tmp_path / "folder.hdr").mkdir()
+    (tmp_path / "city").mkdir()
+    (tmp_path / "city" / "night.hdr").write_bytes(_radiance_header(64, 32))
     (tmp_path / "dangling.hdr").symlink_to(tmp_path / "nowhere.hdr")
     Path(os.fsdecode(os.fsencode(tmp_path) + b"/\xff.hdr")).write_bytes(_radiance_header(64, 32))
     config = SceneConfig(hdri_folder=str(tmp_path), hdri_share=1.0)
     rng = np.random.default_rng(0)
     found = {sky_rand(rng, config) for _ in range(30)}
-    assert found == {f"file:{tmp_path / name}" for name in ("dawn.hdr", "noon.EXR")}
+    assert found == {f"file:{tmp_path / name}" for name in ("dawn.hdr", "noon.EXR", "city/night.hdr")}
     reasons = dict(survey_skies(str(tmp_path)).skipped)
-    assert len(reasons) == 10
+    assert len(reasons) == 9
     assert "more than 32768 x 16384" in reasons[f"file:{tmp_path / 'huge.hdr'}"]
     assert "64 x 36 pixels" in reasons[f"file:{tmp_path / 'render.exr'}"]
     assert all(f"{name}: {reason}".encode() and "\n" not in reason for name, reason in reasons.items())

@@ -34,17 +34,21 @@ class SkySurvey:
 
 
 def sky_sources(folder: str | os.PathLike[str]) -> tuple[str, ...]:
-    """Names of the usable panoramas directly inside a folder, for `Sky.source`. See `survey_skies`."""
+    """Names of the usable panoramas below a folder, for `Sky.source`. See `survey_skies`."""
     return survey_skies(os.fspath(folder)).usable
 
 
 @lru_cache(maxsize=32)
 def survey_skies(folder: str) -> SkySurvey:
-    """Every .hdr and .exr directly inside a folder. Raises FsidError where there is none to use."""
+    """Every .hdr and .exr of a folder and its subfolders; links to folders are not followed.
+
+    Raises FsidError where there is none to use.
+    """
     if not Path(folder).is_dir():
         raise FsidError(f"{folder}: there is no such folder of skies")
     usable, skipped = [], []
-    for path in sorted(path for path in Path(folder).iterdir() if path.suffix.lower() in SKY_SUFFIXES):
+    files = (Path(place, name) for place, _, names in os.walk(folder) for name in names)
+    for path in sorted(path for path in files if path.suffix.lower() in SKY_SUFFIXES):
         reason = _flaw(path)
         if reason:
             skipped.append((shown(f"file:{path}"), reason))

@@ -171,7 +171,7 @@ class SceneConfig:
     texture_folder_share: float = knob(0.5, 0.0, 1.0)
     """Share of materials from these folders, if there are any."""
     hdri_folder: str = ""
-    """Folder of equirectangular panoramas (.hdr .exr) for the sky."""
+    """Folder of equirectangular panoramas (.hdr .exr) for the sky, with its subfolders."""
     hdri_share: float = knob(0.7, 0.0, 1.0)
     """Share of skies from that folder, if there is one."""
 
