@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from fsid.cli.main import COMMANDS, main
+from fsid.dataset.index import index_mosaics
 from fsid.evaluate import read_testset
 from fsid.sensor import Raw, load_profile, noisy_from_clean, read_raw, to_dn, write_dng
 
@@ -187,6 +188,21 @@ def test_the_python_for_bare_mosaics_makes_captures(tmp_path: Path, monkeypatch:
     first = read_raw("set/star/0.5lux.noisy.dng")
     np.testing.assert_array_equal(to_dn(first), np.load("mosaics/star/0.5lux/0000.npy"))
     assert (first.iso, first.cfa) == (3200, "RGGB")
+
+
+def test_the_python_of_the_guide_to_clusters_makes_one_dataset_of_two(
+    photos: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.chdir(tmp_path)
+    for seed in ("0", "1"):
+        small = ["--count", "3", "--width", "64", "--height", "64", "--quiet"]
+        main(["generate", f"node{seed}", "--seed", seed, "--images", str(photos), *small])
+    text = (REPOSITORY / "docs" / "cluster.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"```python\n(.*?)```", text, re.S)
+    exec(compile(block, "cluster.md", "exec"), {})
+    found = index_mosaics("all")
+    assert [m.key for m in found] == [f"{seed}-{i:08d}" for seed in range(2) for i in range(3)]
+    assert [m.scene for m in found] == 2 * [0, 1, 2]  # the pictures that both are of
 
 
 def test_the_readme_names_every_command_and_no_other():
