@@ -178,6 +178,34 @@ def test_ground_far_behind_all_that_shades_it_has_its_shadow(renderer: Renderer)
     np.testing.assert_allclose(frame.radiance[floor & (from_centre > 0.16), 0], lit, rtol=2e-3)
 
 
+@pytest.fixture
+def edge() -> tuple[Camera, list[Drawable], Light]:
+    """A block on the ground, seen close by; the sun is behind it and reaches its top, not its front."""
+    turned = Transform((0.0, 0.0, 0.0), (0.0, 0.0, 20.0), ONE)
+    drawables = [lambertian(grid(6.0)), lambertian(block((0.5, 0.5, 0.4)), at=turned, object_id=1)]
+    sun = Light("sun", (0.0, 0.0, 0.0), (0.3, -0.6, -0.6), (2.0, 2.0, 2.0), 0.0047, 360.0)
+    camera = Camera((0.3, -1.2, 0.7), (0.0, 0.0, 0.35), (0.0, 0.0, 1.0), 12.0, 160, 120)
+    return camera, drawables, sun
+
+
+def test_no_light_leaks_along_the_edges_of_what_is_in_shadow(renderer: Renderer, edge) -> None:
+    camera, drawables, sun = edge
+    roof = lambertian(grid(12.0), at=Transform((0.0, 0.0, 0.8), NO_TURN, ONE), object_id=2)
+    frame = draw(renderer, view(*drawables, roof, lights=(sun,), camera=camera))
+    assert (frame.object_id == 1).mean() > 0.9
+    assert frame.radiance.max() == 0.0
+
+
+def test_shadows_of_one_face_are_not_those_of_the_next(renderer: Renderer, edge) -> None:
+    """Where cloth or leaves are about, the sun's share behind a face is found, too; no edge shows it."""
+    camera, drawables, sun = edge
+    at = Transform((0.0, -3.0, 0.0), NO_TURN, ONE)
+    cloth = Drawable(block((0.1, 0.1, 0.1)), at, (replace(plain(), sheen=0.01),), 2)
+    alone = draw(renderer, view(*drawables, lights=(sun,), camera=camera)).radiance
+    beside = draw(renderer, view(*drawables, cloth, lights=(sun,), camera=camera)).radiance
+    np.testing.assert_allclose(beside, alone, rtol=1e-5)
+
+
 def sphere_hits(camera: Camera, radius_m: float, sample: float = 0.5) -> tuple[np.ndarray, np.ndarray]:
     """Points and normals of a sphere around the world's origin; NaN where the ray misses."""
     rays, rotation = pixel_rays(camera)

@@ -3,15 +3,15 @@ TEXELS(1, rgba32f, occlusion);     // openness, depth, surface from 1
 TEXELS(2, rgba32f, lit_blocks);    // of shadow_blocks.frag
 uniform int block_lights;   // how many lights it holds
 
-const float LEAST_OWN = 0.3;   // share of the blocks around a point that must lie on its surface
+const float LEAST_OWN = 0.3;   // share of the blocks around a point that must lie on its face
 
 // The four blocks of 2 x 2 pixels around a point.
 struct Blocks {
     ivec2 at[4];
     float open[4], depth[4];
     float share[4];     // bilinear
-    float own[4];       // the same among those whose samples lie on the point's own surface; 0 if too few do
-    bool even;          // whether all do
+    float own[4];       // the same among those whose samples lie on the point's own face; 0 if too few do
+    bool even;          // whether all lie on its surface and plane
 };
 
 Blocks blocks_around(Sample p) {
@@ -33,8 +33,9 @@ Blocks blocks_around(Sample p) {
         b.depth[i] = known.y;
         bool own = int(known.z) - 1 == p.surface
             && abs(dot(position - p.position, p.face_normal)) < PLANE_TOLERANCE * p.depth;
-        b.own[i] = own ? b.share[i] : 0.0;
         b.even = b.even && own;
+        vec3 face_normal = unpack_direction(FETCH(samples, block_texel(b.at[i])).y);
+        b.own[i] = own && dot(face_normal, p.face_normal) > MIN_FACE_COSINE ? b.share[i] : 0.0;
     }
     float total = b.own[0] + b.own[1] + b.own[2] + b.own[3];
     for (int i = 0; i < 4; ++i) b.own[i] = total > LEAST_OWN ? b.own[i] / total : 0.0;

@@ -1,6 +1,7 @@
 #version 430 core
 // Share of each light that reaches one sample per block of 2 x 2 pixels, for shade.frag to interpolate where it
-// varies smoothly: four lights a texel, the next four below, blocks.y rows each. 2: not smooth enough for that.
+// varies smoothly: four lights a texel, the next four below, blocks.y rows each. 2: not smooth enough for that, or not
+// asked because the light does not reach this face: around its edges it may reach others.
 #include "screen.glsl"
 #include "encoding.glsl"
 #include "lights.glsl"
@@ -36,7 +37,7 @@ void main() {
             : any(greaterThan(arriving(light, to_light / distance_m, distance_m), vec3(0)));
         bool even, wanted = code.z > 0u && reached && (through || dot(n, to_light) > -0.15 * distance_m);
         float lit = visibility(light, position, n, wanted, block_m, even);
-        result[i] = even ? lit : 2.0;
+        result[i] = even && wanted ? lit : 2.0;
     } while (++i < min(4, light_count - first));
     WRITE(shares, at, result);
 }
