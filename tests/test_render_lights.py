@@ -288,11 +288,53 @@ def simple_scene(**light: object):
         ({"kind": "area"}, r"lights\[0\].size_m"),
         ({"kind": "sun", "direction": (0.0, 0.0, 0.0)}, r"lights\[0\].direction"),
         ({"colour": (1.0, -1.0, 1.0)}, r"lights\[0\].colour"),
+        ({"radius_m": -0.1}, r"lights\[0\].radius_m"),
+        ({"kind": "spot", "cone_deg": 0.0}, r"lights\[0\].cone_deg"),
     ],
 )
 def test_a_light_that_makes_no_sense_is_named(light: dict, message: str) -> None:
     with pytest.raises(FsidError, match=message):
         view_of(simple_scene(**light), 0)
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        {"clearcoat": 1.5},
+        {"sheen": -0.1},
+        {"translucency": 2.0},
+        {"transmission": 1.1},
+        {"emission": -1.0},
+        {"colours": ((0.5, -0.5, 0.5),) * 3},
+    ],
+)
+def test_a_material_that_gives_back_more_than_it_gets_is_named(value: dict) -> None:
+    """Or takes light from what lies around it: radiance was below 0."""
+    scene = simple_scene()
+    scene = replace(
+        scene, materials=tuple(tuple(replace(m, **value) for m in parts) for parts in scene.materials)
+    )
+    with pytest.raises(FsidError, match=rf"materials\[0\]\[0\].{next(iter(value))}"):
+        view_of(scene, 0)
+
+
+def test_ambient_light_below_zero_is_named() -> None:
+    with pytest.raises(FsidError, match=r"scene.ambient"):
+        view_of(replace(simple_scene(), ambient=(-1.0, 0.0, 0.0)), 0)
+
+
+def test_as_many_lights_as_one_likes_shine(renderer: Renderer) -> None:
+    """Forty in one place are one of forty times the strength, shadows too; far too many are refused."""
+    ball = lambertian(sphere(0.2, 24), at=Transform((0.0, 0.0, 0.5), (0.0, 0.0, 0.0), ONE), object_id=1)
+    things = (lambertian(grid(4.0)), ball)
+    one = point_light((0.3, 0.2, 1.5), 4.0, radius_m=0.05)
+    fortieth = replace(one, colour=(0.1, 0.1, 0.1))
+    alone = draw(renderer, view(*things, lights=(one,), camera=SMALL)).radiance
+    many = draw(renderer, view(*things, lights=(fortieth,) * 40, camera=SMALL)).radiance
+    np.testing.assert_allclose(many, alone, atol=0.1 * alone.max())
+    assert np.abs(many - alone).mean() < 0.005 * alone.mean()
+    with pytest.raises(FsidError, match=r"scene.lights: 300 lights"):
+        draw(renderer, view(*things, lights=(fortieth,) * 300, camera=SMALL))
 
 
 def test_a_sky_above_a_closed_room_is_refused() -> None:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fsid.errors import FsidError
 from fsid.scene.check import LIGHT_KINDS
 from fsid.scene.model import Light
 
@@ -22,6 +23,10 @@ BORDER = 0.17
 
 NEAR_M = 0.02
 COLUMNS = 6
+_LARGEST_PX = 16384
+"""Side of the atlas: OpenGL 4.3 promises no more."""
+
+_COARSEST_PX = 64
 KINDS = dict(zip(LIGHT_KINDS, (0, 0, 1, 2), strict=True))
 _WIDEST_SPOT_DEG = 120.0
 _WIDEST_BORDER = 0.7
@@ -100,13 +105,21 @@ class _Field:
 def plan_shadows(
     sources: Sequence[Source], casters: np.ndarray, scene: np.ndarray, finest_px: int
 ) -> ShadowPlan:
-    """Tiles of every light: finest_px texels a side for up to four point lights, half of it for more.
+    """Tiles of every light: finest_px texels a side for up to four point lights, half of it for more, less
+    where the atlas would be too large. FsidError for more lights than it can hold.
 
     casters, scene: (N, 4) spheres of what can cast a shadow, and of everything.
     """
     fields = [_fields(source.light, casters, scene) for source in sources]
     count = sum(len(f) for f in fields)
+    rows = -(-count // COLUMNS)
     tile_px = finest_px if count <= 4 * len(_SIDES) else finest_px // 2
+    while _side_px(rows, tile_px) > _LARGEST_PX:
+        tile_px //= 2
+    if tile_px < _COARSEST_PX:
+        raise FsidError(
+            f"scene.lights: {len(sources)} lights and shining things are too many; leave some out"
+        )
     tiles: list[Tile] = []
     table = np.zeros(max(1, len(sources)), LIGHT)
     for source, field, row in zip(sources, fields, table, strict=False):
@@ -117,7 +130,7 @@ def plan_shadows(
             focal = 1.0 / (f.half + border)
             tiles.append(Tile(f.origin, f.axes, focal, (x * tile_px, y * tile_px), f.range_m, source.lamp))
         _fill(row, source.light, border, first, tiles[first:])
-    size = (_side_px(min(count, COLUMNS), tile_px), _side_px(-(-count // COLUMNS), tile_px))
+    size = (_side_px(min(count, COLUMNS), tile_px), _side_px(rows, tile_px))
     return ShadowPlan(tiles, size, tile_px, len(sources), table)
 
 

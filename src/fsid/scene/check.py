@@ -7,9 +7,10 @@ from itertools import chain
 import numpy as np
 
 from fsid.errors import FsidError
-from fsid.scene.model import Camera, Light, Material, Scene
+from fsid.scene.model import Camera, Light, Material, Scene, Vec3
 
 LIGHT_KINDS = ("point", "spot", "sun", "area")
+_SHARES = ("clearcoat", "clearcoat_roughness", "sheen", "translucency", "transmission")
 
 
 def check_scene(scene: Scene) -> None:
@@ -21,6 +22,9 @@ def check_scene(scene: Scene) -> None:
     for i, transform in enumerate(scene.transforms):
         if 0 in transform.scale:
             raise FsidError(f"scene.transforms[{i}].scale = {transform.scale}: must not be zero")
+    _check_colour("scene.ambient", scene.ambient)
+    if scene.sky is not None:
+        _check_colour("scene.sky.colour", scene.sky.colour)
     of_objects = (
         (f"scene.materials[{i}][{part}]", material)
         for i, parts in enumerate(scene.materials)
@@ -45,10 +49,26 @@ def _check_light(where: str, light: Light) -> None:
         raise FsidError(f"{where}.size_m = {light.size_m}: an area light needs two lengths above 0")
     if light.kind != "point" and not np.linalg.norm(light.direction) > 0:
         raise FsidError(f"{where}.direction = {light.direction}: must not be zero")
-    if not min(light.colour) >= 0:
-        raise FsidError(f"{where}.colour = {light.colour}: there is no light below 0")
+    if not light.radius_m >= 0:
+        raise FsidError(f"{where}.radius_m = {light.radius_m:g}: must be 0 or more")
+    if light.kind == "spot" and not 0 < light.cone_deg <= 360:
+        raise FsidError(f"{where}.cone_deg = {light.cone_deg:g}: must be above 0, at most 360 degrees")
+    _check_colour(f"{where}.colour", light.colour)
+
+
+def _check_colour(where: str, colour: Vec3) -> None:
+    if not min(colour) >= 0:
+        raise FsidError(f"{where} = {colour}: there is no light below 0")
 
 
 def _check_material(where: str, material: Material) -> None:
     if not material.tile_m > 0:
         raise FsidError(f"{where}.tile_m = {material.tile_m:g}: must be above 0")
+    for name in _SHARES:
+        if not 0 <= getattr(material, name) <= 1:
+            raise FsidError(f"{where}.{name} = {getattr(material, name):g}: must lie between 0 and 1")
+    for name in ("roughness_scale", "emission"):
+        if not getattr(material, name) >= 0:
+            raise FsidError(f"{where}.{name} = {getattr(material, name):g}: must be 0 or more")
+    if not min(map(min, material.colours)) >= 0:
+        raise FsidError(f"{where}.colours = {material.colours}: there is no albedo below 0")

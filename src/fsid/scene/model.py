@@ -32,7 +32,8 @@ class Material:
     """M: a baked family recoloured. `fsid.assets.bake_material(family, variant)` makes the maps.
 
     family: a name of `fsid.assets.material_families()`, or "file:PATH" (a texture folder or the common
-    prefix of its maps). colours: colour_a, colour_b, colour_c of `fsid.assets.maps`, linear, 0..1.
+    prefix of its maps). colours: colour_a, colour_b, colour_c of `fsid.assets.maps`, linear; what they mix to
+    is cut at 1.
     tile_m: edge of one texture tile in metres. rotation_deg: of the tile in the surface.
     roughness_scale multiplies the roughness map. relief_scale multiplies the family's relief.
     clearcoat: 0..1, weight of a clear dielectric layer (index 1.5) of roughness clearcoat_roughness above it.
