@@ -14,7 +14,8 @@ from fsid.assets import survey_skies
 from fsid.errors import FsidError
 from fsid.render import Frame, Renderer
 from fsid.render.drawable import Drawable, View, background_drawable, panel_drawable, view_of
-from fsid.render.sky import panorama
+from fsid.render.room import light_sky
+from fsid.render.sky import angles, panorama
 from fsid.scene import SceneConfig, sample
 from fsid.scene.model import Background, Camera, Light, Sky, Transform, Vec3
 from render_scenes import (
@@ -448,6 +449,18 @@ def test_a_background_without_a_material_is_named() -> None:
                 dict.fromkeys(WALLS, plain()),
             )
         )
+
+
+@pytest.mark.parametrize(("rows", "turn"), [(512, 0), (512, 7), (512, 200), (333, 1), (1500, 750)])
+def test_the_sun_in_a_picture_of_the_sky_gives_all_its_light(rows: int, turn: int) -> None:
+    """One texel of irradiance 3 wherever it lies: E max(cos, 0) / pi towards each axis, besides the grey."""
+    picture, row = np.full((rows, 2 * rows, 3), 0.2, np.float32), rows // 4
+    elevation, azimuth = angles(rows)
+    picture[row, turn] += 3.0 / (np.cos(elevation[row]) * (np.pi / rows) ** 2)
+    up, around = elevation[row], azimuth[turn]
+    to_sun = np.array([np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)])
+    expected = 0.2 + 3.0 * np.maximum(np.array([1, -1]) * to_sun[:, None], 0.0).ravel() / np.pi
+    np.testing.assert_allclose(light_sky(picture).sides[:, 1], expected, atol=0.025)
 
 
 def test_a_sky_turns_from_x_towards_y(tmp_path) -> None:

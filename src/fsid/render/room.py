@@ -20,12 +20,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from fsid.render.shadows import cone_cosines, unit
+from fsid.render.sky import angles
 from fsid.scene.colour import LUMINANCE
 from fsid.scene.model import Light, Vec3
 
 GRID = 16
 SKY_GRID = 64
 SKY_HALF_M = 1e5
+_PEAK = 10.0
+"""Radiance relative to the mean from which on nothing of a sky may be missed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,12 +74,31 @@ def light_sky(panorama: np.ndarray) -> Room:
         coarse = (coarse[:, ::2] + coarse[:, 1::2]) / 2
     norm = np.linalg.norm(directions, axis=-1)
     unit_direction = directions / norm[..., None]
-    radiance = look_up(coarse, unit_direction)
+    most = np.float32(_PEAK) * panorama.mean()
+    radiance = look_up(np.minimum(coarse, most), unit_direction)
+    _add_peaks(radiance, panorama, most, (2 / SKY_GRID) ** 2 / norm**3)
     cosines = np.einsum("sijk,ak->asij", unit_direction, _AXES)
     weight = np.maximum(cosines, 0.0) / norm**3
     total = weight.sum((1, 2, 3))[:, None]
     sides = np.einsum("asij,sijc->ac", weight, radiance) / total
     return Room(half, np.zeros(3), sides, radiance)
+
+
+def _add_peaks(radiance: np.ndarray, panorama: np.ndarray, most: float, solid_angle: np.ndarray) -> None:
+    """Add what of a panorama is brighter than `most`, by its power, to the cells (6, G, G, 3) that it is in:
+    a look-up misses most suns, or takes them several times. solid_angle: (6, G, G) of the cells."""
+    texel, colour = np.divmod(np.flatnonzero(panorama > most), 3)
+    row, column = np.divmod(texel, panorama.shape[1])
+    elevation, azimuth = angles(len(panorama))
+    up, around = elevation[row], azimuth[column]
+    power = (panorama[row, column, colour] - most) * np.cos(up) * (np.pi / len(panorama)) ** 2
+    direction = np.stack([np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)])
+    axis, each = np.abs(direction).argmax(0), np.arange(len(texel))
+    along = direction[axis, each]
+    at = [direction[(axis + i) % 3, each] / np.abs(along) for i in (2, 1)]
+    cells = [((0.5 + 0.5 * x) * SKY_GRID).astype(int).clip(0, SKY_GRID - 1) for x in at]
+    place = (2 * axis + (along < 0), *cells)
+    np.add.at(radiance, (*place, colour), power / solid_angle[place])
 
 
 def look_up(panorama: np.ndarray, direction: np.ndarray) -> np.ndarray:
