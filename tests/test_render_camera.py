@@ -247,6 +247,19 @@ def test_motion_blur_is_a_box_along_the_path(renderer: Renderer) -> None:
     assert (frame.object_id == draw(renderer, view(disc)).object_id.repeat(2, 0).repeat(2, 1)).mean() > 0.97
 
 
+def test_a_small_thing_that_moves_leaves_no_ghosts(renderer: Renderer) -> None:
+    """A ball of 4 pixels, a thousandth of the picture's, is a line along the 41 pixels of its path."""
+    ball = lambertian(sphere(0.022, 24), (0.9, 0.9, 0.9), at(0.0, 0.0, 0.3), object_id=1)
+    ball = replace(ball, motion=Motion(velocity_m_s=(3.0, 0.0, 0.0)))
+    what = view(lambertian(grid(8.0), (0.1, 0.1, 0.1)), ball, ambient=1.0)
+    camera = replace(FROM_ABOVE, width=192, height=108, exposure_s=0.14)
+    sharp = draw(renderer, replace(what, camera=replace(camera, exposure_s=0.0)))
+    assert 5 < (sharp.object_id == 1).sum() < 0.001 * sharp.object_id.size
+    row = draw(renderer, replace(what, camera=camera)).radiance[53, 80:112, 0]
+    assert row.min() > 0.11
+    assert row.max() < 1.4 * row.min()
+
+
 def test_a_camera_that_makes_no_sense_is_named() -> None:
     for change in ({"focus_m": 0.0}, {"aperture_m": -1.0}, {"exposure_s": -1.0}):
         with pytest.raises(FsidError, match=r"scene\.cameras"):

@@ -98,7 +98,7 @@ def is_moving(camera: Camera, drawables: Sequence[Drawable]) -> bool:
 
 
 def _motion_px(camera: Camera, drawables: Sequence[Drawable], frame: Frame, sample: float) -> float:
-    """How far the fastest thing in the image moves during the exposure."""
+    """How far the fastest thing in the image moves during the exposure, be it small."""
     start, end = (camera.time_s + side * camera.exposure_s / 2 for side in (-1, 1))
     middle = (camera, lens_of(camera), camera.time_s)
     paths = [
@@ -106,7 +106,9 @@ def _motion_px(camera: Camera, drawables: Sequence[Drawable], frame: Frame, samp
         for time in (start, end)
     ]
     length = np.linalg.norm(paths[1] - paths[0], axis=-1)
-    return float(np.nanquantile(length, 0.999)) if np.isfinite(length).any() else 0.0
+    moving = [drawable.object_id for drawable in drawables if drawable.motion != UNMOVED]
+    lengths = [length, *(length[frame.object_id == number] for number in moving)]
+    return max((float(np.nanquantile(own, 0.999)) for own in lengths if np.isfinite(own).any()), default=0.0)
 
 
 def _blur_px(camera: Camera, lens: Lens, frame: Frame) -> float:
