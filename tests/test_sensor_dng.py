@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from fsid.errors import FsidError
 from fsid.sensor import (
     CFA_PATTERNS,
+    Layout,
     NoiseLevel,
     Raw,
     clean_levels,
@@ -27,6 +28,7 @@ from fsid.sensor import (
 from fsid.sensor.colour import published_matrices
 from fsid.sensor.dng import read_stored
 from fsid.sensor.dng_tags import noise_profile
+from fsid.sensor.frames import find_frames
 from fsid.sensor.metadata import Metadata
 from fsid.sensor.tiff import ASCII, BYTE, CFA, LONG, SHORT, Directory, Tag, image_tags, tiff_bytes
 
@@ -276,6 +278,23 @@ def test_stored_integers_are_moved_by_whole_dn_and_never_fall_together(tmp_path)
     expected = dn - np.tile([[-7, -2], [1, 8]], (16, 20))
     inside = (dn > 0) & (dn < 1023)
     np.testing.assert_array_equal(moved, np.where(inside, expected.clip(0, 1023), dn))
+
+
+def test_a_frame_has_the_black_levels_of_a_first_one_that_is_as_large(tmp_path):
+    """Where rows differ in black level; other levels repeat, over whatever size."""
+    rows = (50716, "2i", 32, tuple(n for row in range(32) for n in (row % 3 - 1, 1)))
+    for name, height, *deltas in (("a", 32, rows), ("small", 24), ("large", 64)):
+        dn = np.full((height, 40), 70, np.uint16)
+        write_with_black(tmp_path / f"{name}.dng", dn, (50714, "H", 1, 64), *deltas)
+    paths = [tmp_path / f"{name}.dng" for name in ("a", "small", "large")]
+    frames = find_frames(paths, [], Layout())
+    first, small, large = (next(f for f in frames.frames if f.path == path) for path in paths)
+    np.testing.assert_array_equal(
+        frames.read(first, Layout()), 70 - (np.arange(32) % 3 - 1)[:, None] + np.zeros(40)
+    )
+    assert frames.read(small, Layout()).shape == (24, 40)
+    with pytest.raises(FsidError, match=r"large\.dng: is larger than the first frame"):
+        frames.read(large, Layout())
 
 
 def test_a_crop_ends_with_the_image(tmp_path):
