@@ -224,7 +224,13 @@ def test_the_slider_of_a_report_moves_in_a_browser(photos: Path, tmp_path: Path)
 
 
 def test_radii_of_dead_leaves_have_the_density_of_scale_invariance(monkeypatch):
-    """1 / r^3 between 4 and 64 texels: P(radius > r) = (r^-2 - 64^-2) / (4^-2 - 64^-2)."""
+    """1 / r^3 per area between 4 and 64 texels: of the discs that reach a square of 128, P(radius > r) from
+    the integral of (128 + 2 r)^2 / r^3."""
+
+    def reaching(low: float) -> float:
+        radii = np.linspace(low, 64, 20_000)
+        return float(np.trapezoid((128 + 2 * radii) ** 2 / radii**3, radii))
+
     radii = []
 
     def put(rng, picture, bare, radius, colour):
@@ -234,6 +240,6 @@ def test_radii_of_dead_leaves_have_the_density_of_scale_invariance(monkeypatch):
     monkeypatch.setattr("fsid.evaluate.dead_leaves._put", put)
     dead_leaves_rand(np.random.default_rng(0), 64, 64)
     assert 4 <= min(radii) < max(radii) <= 64
-    for radius in (5.0, 8.0, 16.0):
-        expected = (radius**-2 - 64.0**-2) / (4.0**-2 - 64.0**-2)
+    for radius in (5.0, 8.0, 16.0, 32.0):
+        expected = reaching(radius) / reaching(4.0)
         assert np.mean(np.array(radii) > radius) == pytest.approx(expected, abs=0.03)
