@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from fsid.cli.libraries import read_mesh_folders
+from fsid.cli.libraries import read_libraries
 from fsid.cli.main import main
 from fsid.cli.progress import progress_bar
 from fsid.config import read_yaml
@@ -143,12 +143,26 @@ def test_meshes_that_are_skipped_are_counted_and_the_first_is_named(
         "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
     )
     (tmp_path / "junk.ply").write_bytes(b"junk")
-    read_mesh_folders(SceneConfig(mesh_folders=(str(tmp_path),)), quiet=False)
+    read_libraries(SceneConfig(mesh_folders=(str(tmp_path),)), quiet=False)
     said = capsys.readouterr().err
     assert "reading" in said
     assert re.search(r"1 meshes, 1 skipped, first \S*junk\.ply: \w+", said.replace("\n", " "))
     with pytest.raises(FsidError, match="no usable mesh"):
-        read_mesh_folders(SceneConfig(mesh_folders=(str(tmp_path / "junk.ply"),)), quiet=True)
+        read_libraries(SceneConfig(mesh_folders=(str(tmp_path / "junk.ply"),)), quiet=True)
+
+
+def test_texture_sets_are_read_behind_a_bar_before_the_first_pair(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A library of a thousand takes minutes, which passed without a word."""
+    Image.new("RGB", (16, 16), (90, 120, 60)).save(tmp_path / "wall_Color.png")
+    Image.new("RGB", (16, 16)).save(tmp_path / "wall_Normal.png")
+    command = ["--count", "1", "--width", "32", "--height", "32", "--dry-run"]
+    setting = f"scene.texture_folders=[{tmp_path}]"
+    main(["generate", str(tmp_path / "out"), *command, "--set", setting])
+    said = " ".join(capsys.readouterr().err.split())
+    assert "reading" in said
+    assert f"{tmp_path}: 1 texture sets, 1 skipped, first {tmp_path}/wall_Normal.png: wall_Normal" in said
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ missing has a default; a set without a colour map, or with an unreadable file, i
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -63,15 +64,20 @@ def texture_sources(path: str | os.PathLike[str]) -> tuple[str, ...]:
 
 
 @lru_cache(maxsize=32)
-def survey_textures(path: str) -> TextureSurvey:
+def survey_textures(
+    path: str, progress: Callable[[int, int], None] = lambda done, total: None
+) -> TextureSurvey:
     """Every texture set of a folder and its subfolders, each read once.
 
-    Raises FsidError where `path` is no folder or holds no usable set.
+    progress: called with the number of sets done and of all. Raises FsidError where `path` is no folder or
+    holds no usable set.
     """
     if not Path(path).is_dir():
         raise FsidError(f"{path}: there is no such folder of textures")
     usable, skipped = [], []
-    for found in sets_below(Path(path)):
+    sets = sets_below(Path(path))
+    for done, found in enumerate(sets):
+        progress(done, len(sets))
         name = f"{PREFIX}{found.path}"
         if shown(name) != name:
             skipped.append((shown(name), NOT_TEXT))
@@ -81,6 +87,7 @@ def survey_textures(path: str) -> TextureSurvey:
             usable.append(name)
         except RefusedImageError as error:
             skipped.append((name, str(error)))
+    progress(len(sets), len(sets))
     skipped += [(shown(f"{PREFIX}{file}"), shown(why)) for file, why in strangers_below(Path(path))]
     if not usable:
         why = f"; the first of {len(skipped)} skipped: {skipped[0][1]}" if skipped else ""

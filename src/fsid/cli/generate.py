@@ -14,7 +14,7 @@ from rich.console import Console
 from tyro.conf import Positional
 
 from fsid.cli.iso_notes import note_extrapolation
-from fsid.cli.libraries import read_mesh_folders
+from fsid.cli.libraries import read_libraries
 from fsid.cli.progress import progress_bar
 from fsid.errors import FsidError
 
@@ -112,10 +112,10 @@ def generate(
         raise FsidError("--count: say how many pairs the dataset is to have, at least 1")
     seed = seed or 0
     workforce = Workforce(workers, ray, workers_per_gpu)
-    dataset = dataset_config(settings, seed)  # names what does not exist before a library of meshes is read
+    dataset = dataset_config(settings, seed)  # names what does not exist before a library is read
     note_extrapolation(settings.cameras, *settings.iso_range, quiet=quiet)
     if not settings.images:
-        read_mesh_folders(settings.scene, quiet=quiet)
+        read_libraries(settings.scene, quiet=quiet)
     if dry_run:
         Console(markup=False).print(_plan(out, settings, dataset, count, workforce), soft_wrap=True)
     else:

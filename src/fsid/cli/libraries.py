@@ -1,7 +1,8 @@
-"""The user's own meshes are read before anything is made of them: it takes minutes, and once per library."""
+"""The user's own meshes and textures are read before anything is made of them: it takes minutes, once."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from rich.console import Console
@@ -12,23 +13,33 @@ if TYPE_CHECKING:
     from fsid.scene import SceneConfig
 
 
-def read_mesh_folders(config: SceneConfig, *, quiet: bool) -> None:
-    """Fill the cache with every mesh of `config.mesh_folders`; say how many were skipped, and why the first.
+def read_libraries(config: SceneConfig, *, quiet: bool) -> None:
+    """Fill the cache with every mesh of `config.mesh_folders` and every set of `config.texture_folders`; say
+    how many were skipped, and why the first.
 
-    Raises FsidError for a folder without a usable mesh.
+    Raises FsidError for a folder without a usable one.
     """
-    from fsid.assets.sources import PREFIX, survey_meshes
+    from fsid.assets import survey_meshes, survey_textures
 
-    console = Console(stderr=True, quiet=quiet)
     for folder in config.mesh_folders:
         with progress_bar(f"reading {folder}", "meshes", quiet=quiet) as progress:
-            survey = survey_meshes(folder, config.mesh_folders_cc0_only, progress)
-        if survey.skipped:
-            name, reason = survey.skipped[0]
-            usable, skipped = len(survey.usable), len(survey.skipped)
-            console.print(
-                f"{folder}: {usable} meshes, {skipped} skipped, first {name.removeprefix(PREFIX)}: {reason}",
-                style="yellow",
-                soft_wrap=True,
-                markup=False,
-            )
+            meshes = survey_meshes(folder, config.mesh_folders_cc0_only, progress)
+        _tell(f"{folder}: {len(meshes.usable)} meshes", meshes.skipped, quiet=quiet)
+    for folder in config.texture_folders:
+        with progress_bar(f"reading {folder}", "texture sets", quiet=quiet) as progress:
+            sets = survey_textures(folder, progress)
+        _tell(f"{folder}: {len(sets.usable)} texture sets", sets.skipped, quiet=quiet)
+
+
+def _tell(found: str, skipped: Sequence[tuple[str, str]], *, quiet: bool) -> None:
+    """Nothing where nothing was skipped."""
+    from fsid.assets.sources import PREFIX
+
+    if skipped:
+        name, reason = skipped[0]
+        Console(stderr=True, quiet=quiet).print(
+            f"{found}, {len(skipped)} skipped, first {name.removeprefix(PREFIX)}: {reason}",
+            style="yellow",
+            soft_wrap=True,
+            markup=False,
+        )

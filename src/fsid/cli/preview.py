@@ -7,7 +7,7 @@ from pathlib import Path
 from tyro.conf import Positional
 
 from fsid.cli.generate import Variant
-from fsid.cli.libraries import read_mesh_folders
+from fsid.cli.libraries import read_libraries
 from fsid.cli.progress import progress_bar
 from fsid.config import Override
 
@@ -55,6 +55,6 @@ def preview(
     settings = generate_config(config, [("width", 480), ("height", 270), *given])
     check_given(settings, given_keys(given), "preview")
     dataset_config(settings, seed)
-    read_mesh_folders(settings.scene, quiet=quiet)
+    read_libraries(settings.scene, quiet=quiet)
     with progress_bar("scenes", "scenes", quiet=quiet) as progress:
         save_png(output, contact_sheet(settings, seed, count, progress=progress))
