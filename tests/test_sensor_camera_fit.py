@@ -380,6 +380,13 @@ def test_raw_files_without_an_iso_are_noted_as_iso_100(tmp_path, rng):
     assert "noted as ISO 100" in load_profile(tmp_path / "mine.yaml").notes
 
 
+def test_mosaics_without_a_pattern_are_noted_as_those_of_no_filters(tmp_path, rng):
+    paths = write_arrays(tmp_path, [to_dn(raw) for raw in exposures(rng, scene(), 800, 6)])
+    for cfa, is_noted in ((None, True), ("MONO", False), ("RGGB", False)):
+        found = calibrate(paths, name="x", layout=replace(LAYOUT, cfa=cfa))
+        assert ("--cfa states its pattern" in found.profile.notes) == is_noted
+
+
 def test_an_iso_that_is_given_replaces_no_other_unsaid(dng_bursts, tmp_path, rng):
     one = [dng_bursts / "light1600"]
     for given, is_noted in ((1600, False), (800, True)):

@@ -222,6 +222,8 @@ def _bare_frames(paths: Sequence[Path], dark: Sequence[Path], layout: Layout) ->
         same_dn = max(SAME_LIGHT * mean_dn, SAME_DN, SAME_DARK * noise_dn)
         frames.append(Frame(path, _iso_in(path), 0.0, mean_dn, same_dn))
     notes = []
+    if layout.cfa is None:
+        notes.append("taken for a sensor without colour filters (MONO); --cfa states its pattern")
     white = layout.white_level
     if white is None:
         white = 2 ** max(highest.bit_length(), 8) - 1
