@@ -121,6 +121,18 @@ def test_the_card_counts_what_the_checks_refused(tmp_path: Path, rng: np.random.
     assert f"| refused by the checks | {times} of {4 + times} frames: black ({times}) times |" in card
 
 
+def test_the_card_counts_pictures_once_and_has_nothing_of_scenes_where_there_are_none(
+    tmp_path: Path, rng: np.random.Generator
+) -> None:
+    for i in range(2):
+        Image.fromarray(rng.integers(40, 200, (64, 64, 3), np.uint8)).save(tmp_path / f"{i}.png")
+    generate(tmp_path / "data", GenerateConfig(images=str(tmp_path), width=32, height=32), count=5)
+    card = (tmp_path / "data" / "README.md").read_text()
+    assert "5 pairs for denoise, 32 x 32 pixels at most, from 2 pictures (fsid" in card
+    assert "| variant |" not in card
+    assert "| backgrounds |" not in card
+
+
 def test_licences_of_meshes_are_counted_by_use(tmp_path: Path) -> None:
     import trimesh
 

@@ -87,11 +87,17 @@ def _text(dataset: DatasetConfig, tally: _Tally, statistics: Sequence[str], comm
     drawn = len(tally.frames) + refused.total()
     lowest, middle, highest = np.percentile(tally.isos, (0, 50, 100))
     size = f"{config.crop_width or config.width} x {config.crop_height or config.height}"
+    if config.images:
+        sources, of_scenes = f"{len(tally.counts['picture'])} pictures", []
+    else:
+        sources = f"{len(tally.frames)} rendered scenes"
+        backgrounds = _listed(tally.counts.get("background", Counter()), "scenes")
+        of_scenes = [f"| variant | {config.variant} |", f"| backgrounds | {backgrounds} |"]
     lines = [
         "# RAW pairs made by FSID",
         "",
-        f"{len(tally.isos)} pairs for {config.task}, {size} pixels at most, from {len(tally.frames)} "
-        f"{'pictures' if config.images else 'rendered scenes'} (fsid {__version__}, seed {dataset.seed}). "
+        f"{len(tally.isos)} pairs for {config.task}, {size} pixels at most, from {sources} "
+        f"(fsid {__version__}, seed {dataset.seed}). "
         "WebDataset shards; `config.yaml` has every setting, each pair's JSON all that makes it again.",
         "",
         f"![Some of the clean images, developed]({SHEET})",
@@ -101,8 +107,7 @@ def _text(dataset: DatasetConfig, tally: _Tally, statistics: Sequence[str], comm
         *(f"| {name} | {count} pairs |" for name, count in sorted(splits.items())),
         f"| cameras | {_listed(tally.counts['camera'], 'pairs')} |",
         f"| ISO | {lowest:.0f} to {highest:.0f}, median {middle:.0f} |",
-        f"| variant | {config.variant} |",
-        f"| backgrounds | {_listed(tally.counts.get('background', Counter()), 'scenes')} |",
+        *of_scenes,
         f"| refused by the checks | {refused.total()} of {drawn} frames: {_listed(refused, 'times')} |",
         "",
         "## Sources and licences",
