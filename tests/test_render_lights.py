@@ -261,6 +261,21 @@ def test_glass_bends_rays_at_a_slant(renderer: Renderer) -> None:
     assert abs(bright[0].mean() - bright[1].mean()) > 0.5
 
 
+def test_mirrored_glass_bends_rays_as_glass_does(renderer: Renderer) -> None:
+    """A scale below 0 mirrors a thing; a block that is alike on both sides looks as before."""
+    camera = Camera((0.6, -1.2, 0.9), (0.0, 0.0, 0.2), (0.0, 0.0, 1.0), 45.0, 64, 48)
+    clear = replace(plain(ONE, roughness=20), transmission=1.0)
+    stripe = lambertian(
+        grid(0.1), (0.9, 0.1, 0.1), at=replace(STILL, position_m=(-0.1, 0.2, 0.001)), object_id=2
+    )
+    images = []
+    for scale in (ONE, (-1.0, 1.0, 1.0)):
+        glass = Drawable(block((0.5, 0.5, 0.3)), replace(STILL, scale=scale), (clear,), 1)
+        what = view(lambertian(grid(6.0)), stripe, glass, ambient=1.0, camera=camera)
+        images.append(draw(renderer, what).radiance)
+    np.testing.assert_allclose(images[1], images[0], atol=0.02)
+
+
 def test_sampled_scenes_are_finite_and_without_fireflies(renderer: Renderer) -> None:
     """No pixel outshines the brightest of its 24 neighbours fifty times."""
     for seed in (21,):
