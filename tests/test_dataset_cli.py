@@ -242,8 +242,10 @@ def test_a_dry_run_is_of_what_the_run_would_do(data: Path, tmp_path: Path, capsy
     whole = [(f"{index:08d}", samples["00000000"]) for index in range(16)]
     write_shard(tmp_path / "shard-00000.tar", whole)
     command = [words(data)[0], str(tmp_path), *words(data)[2:], "--count", "20", "--dry-run"]
-    main(command)
-    assert "4 pairs in 1 shards; 16 more are there" in capsys.readouterr().out
+    main([*command, "--workers", "1000"])
+    told = capsys.readouterr().out
+    assert "4 pairs in 1 shards; 16 more are there" in told
+    assert "with 1 workers" in told
     with pytest.raises(SystemExit):
         main(["5" if word == "4" else word for word in command])  # its seed
     assert "already holds another dataset" in " ".join(capsys.readouterr().err.split())

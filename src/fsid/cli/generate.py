@@ -174,7 +174,7 @@ def _plan(
     free = shutil.disk_usage(folder).free
     return (
         f"{out}: {costs.pairs} pairs in {costs.shards} shards{there}\n"
-        f"time   {hours} h {minutes:02d} min with {workforce.workers} workers "
+        f"time   {hours} h {minutes:02d} min with {costs.workers} workers "
         f"({costs.seconds / costs.pairs:.3g} s per pair)\n"
         f"size   {costs.bytes / 1e9:.3g} GB ({costs.bytes / costs.pairs / 1e6:.3g} MB per pair), "
         f"{free / 1e9:.3g} GB are free\n"

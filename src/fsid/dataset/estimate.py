@@ -23,10 +23,12 @@ _TAR_BLOCK = 512
 
 @dataclass(frozen=True)
 class Estimate:
-    """seconds: of all pairs, by all workers. bytes: on disk. measured_pairs: what it is based on."""
+    """workers: that have a shard to make. seconds: of all pairs, by these. bytes: on disk. measured_pairs:
+    what it is based on."""
 
     pairs: int
     shards: int
+    workers: int
     seconds: float
     bytes: int
     measured_pairs: int
@@ -57,14 +59,17 @@ class _Trial:
 def estimate(config: GenerateConfig, *, count: int, seed: int, workforce: Workforce) -> Estimate:
     """Cost of `count` samples made by `workforce`; writes nothing. FsidError as in `generate`."""
     dataset = dataset_config(config, seed)
-    trials = [_Trial(config, seed, (1 + FRAMES) * worker) for worker in range(workforce.workers)]
-    results = [result for _, result in run(workforce.crew(), trials, tasks_per_worker=len(trials))]
+    shards = -(-count // dataset.shard_size)
+    workers = min(workforce.workers, shards)
+    trials = [_Trial(config, seed, (1 + FRAMES) * worker) for worker in range(workers)]
+    results = [result for _, result in run(workforce.crew(workers), trials, tasks_per_worker=workers)]
     pairs = sum(made for _, _, made in results)
     seconds_per_pair = sum(seconds for seconds, _, _ in results) / pairs
     return Estimate(
         pairs=count,
-        shards=-(-count // dataset.shard_size),
-        seconds=count * seconds_per_pair / workforce.workers,
+        shards=shards,
+        workers=workers,
+        seconds=count * seconds_per_pair / workers,
         bytes=round(count * sum(size for _, size, _ in results) / pairs),
         measured_pairs=pairs,
     )

@@ -52,13 +52,14 @@ class Workforce:
         if self.workers < 1 or self.workers_per_gpu < 0:
             raise FsidError("--workers must be at least 1, --workers-per-gpu at least 0")
 
-    def crew(self) -> Crew:
-        """The workers, none of them started."""
+    def crew(self, tasks: int) -> Crew:
+        """As many workers as `tasks` can use, which share the cores; none of them started."""
+        size = min(self.workers, tasks)
         if not self.ray:
-            return LocalCrew(self.workers, Worker, self.workers_per_gpu)
+            return LocalCrew(size, Worker, self.workers_per_gpu)
         from fsid.dataset.ray_crew import RayCrew
 
-        return RayCrew(self.ray, self.workers, Worker, self.workers_per_gpu)
+        return RayCrew(self.ray, size, Worker, self.workers_per_gpu)
 
 
 @dataclass(frozen=True)
@@ -121,13 +122,13 @@ def generate(
         tasks_per_worker = max(1, SAMPLES_PER_WORKER // dataset.shard_size)
         if todo:
             _withdraw_card(out)
-            for _, made in run(workforce.crew(), todo, tasks_per_worker=tasks_per_worker, lost=lost):
+            for _, made in run(workforce.crew(len(todo)), todo, tasks_per_worker=tasks_per_worker, lost=lost):
                 done += made
                 progress(done, count)
         shards = [shard_path(out, number) for number in range(-(-count // dataset.shard_size))]
 
         def redraw(task: Settle) -> None:
-            list(run(workforce.crew(), [task], tasks_per_worker=1, lost=lost))
+            list(run(workforce.crew(1), [task], tasks_per_worker=1, lost=lost))
 
         if todo or not (out / CARD).exists():
             settle(shards, dataset.generate, dataset.seed, redraw)
