@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from fsid import __version__
 from fsid.cli import main as cli
 from fsid.cli import progress
 from fsid.pace import Pace
@@ -143,3 +144,27 @@ def test_a_help_breaks_lines_where_its_terminal_does(capsys: pytest.CaptureFixtu
     text = capsys.readouterr().out
     assert "images.csv (every image) and report.html (tables, plot, before and after, error maps)." in text
     assert "network (nafnet-small); may be given several times" in text
+
+
+def test_the_version_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    cli.main(["--version"])
+    assert capsys.readouterr().out == f"fsid {__version__}\n"
+
+
+@pytest.mark.parametrize(
+    ("command", "names"),
+    [
+        ("train data -o run --config nafnet-tony", "nafnet-32, nafnet-64, nafnet-small, nafnet-tiny, paper"),
+        ("generate data --count 1 --config fsid-175", "fsid-175k"),
+    ],
+)
+def test_a_configuration_that_is_none_is_refused_with_those_that_are(
+    command: str, names: str, tmp_path: Path, monkeypatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as stop:
+        cli.main(command.split())
+    assert stop.value.code == 2
+    told = " ".join(capsys.readouterr().err.split())
+    assert f"is no file and no built-in configuration ({names})" in told
+    assert not any(tmp_path.iterdir())

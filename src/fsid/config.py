@@ -13,6 +13,7 @@ import copy
 import dataclasses
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from importlib.resources import as_file, files
 from pathlib import Path
 from typing import Any, Literal, TypeVar, get_args, get_origin
 
@@ -180,6 +181,36 @@ def load_settings(
     sources = list(dict.fromkeys(source for source, _, _ in layers))
     guilty = [s for s in sources if _overlaid(kind, [x for x in layers if x[0] != s])[1] != fault]
     raise FsidError(f"{' and '.join(guilty or sources) or 'defaults'}: {fault}")
+
+
+def load_named(
+    kind: type[T],
+    name_or_file: str | Path,
+    overrides: Sequence[Override] = (),
+    read: Callable[[Path], dict[str, Any]] = read_yaml,
+) -> T:
+    """`load_settings` of a built-in configuration (`fsid/configs`) by its name, or of a YAML file.
+
+    FsidError as there, and where it is neither, with the names that there are for `kind`.
+    """
+    builtin = files("fsid.configs").joinpath(f"{name_or_file}.yaml")
+    if builtin.is_file():
+        with as_file(builtin) as file:
+            return load_settings(kind, file, overrides)
+    if not Path(name_or_file).exists():
+        names = ", ".join(_names_for(kind))
+        raise FsidError(f"{name_or_file}: is no file and no built-in configuration ({names})")
+    return load_settings(kind, Path(name_or_file), overrides, read)
+
+
+def _names_for(kind: type[Any]) -> list[str]:
+    known = {field.name for field in dataclasses.fields(kind)}
+    found = (file for file in files("fsid.configs").iterdir() if file.name.endswith(".yaml"))
+    return sorted(
+        file.name.removesuffix(".yaml")
+        for file in found
+        if known.issuperset(parse_yaml(file.read_text("utf-8"), file.name))
+    )
 
 
 def _overlaid(kind: type[T], layers: Sequence[Layer]) -> tuple[T | None, str]:

@@ -19,6 +19,7 @@ import tyro
 from rich.console import Console
 from rich.text import Text
 
+from fsid import __version__
 from fsid.cli import (
     calibrate,
     demo,
@@ -109,6 +110,9 @@ def _terminate(number: int, frame: FrameType | None) -> None:
 
 
 def _run(arguments: Sequence[str] | None) -> None:
+    if (sys.argv[1:] if arguments is None else list(arguments)) == ["--version"]:
+        print(f"fsid {__version__}")
+        return
     try:
         _check_repeated(sys.argv[1:] if arguments is None else arguments)
         for command in COMMANDS.values():

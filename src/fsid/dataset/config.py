@@ -8,11 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from importlib.resources import as_file, files
 from pathlib import Path
 from typing import Any
 
-from fsid.config import Override, from_plain, load_settings, read_yaml
+from fsid.config import Override, from_plain, load_named, load_settings, read_yaml
 from fsid.errors import FsidError
 from fsid.scene import VARIANTS, SceneConfig
 
@@ -178,12 +177,9 @@ def generate_config(name_or_file: str | Path | None, overrides: Sequence[Overrid
 
     The file may be the config.yaml of a dataset: its settings are taken, its seed is not.
     """
-    builtin = files("fsid.configs").joinpath(f"{name_or_file}.yaml")
-    if name_or_file is None or not builtin.is_file():
-        file = None if name_or_file is None else Path(name_or_file)
-        return load_settings(GenerateConfig, file, overrides, _read_settings)
-    with as_file(builtin) as file:
-        return load_settings(GenerateConfig, file, overrides)
+    if name_or_file is None:
+        return load_settings(GenerateConfig, None, overrides)
+    return load_named(GenerateConfig, name_or_file, overrides, _read_settings)
 
 
 def _read_settings(file: Path) -> dict[str, Any]:

@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from importlib.resources import as_file, files
 from pathlib import Path
 from typing import Literal
 
-from fsid.config import Override, load_settings
+from fsid.config import Override, load_named
 from fsid.dataset.cells import check_shrink
 from fsid.denoise.raw_denoiser import MAX_PATCH_PX, NetworkConfig
 from fsid.errors import FsidError
@@ -102,8 +101,4 @@ class TrainConfig:
 
 def train_config(name_or_file: str | Path, overrides: Sequence[Override] = ()) -> TrainConfig:
     """A built-in configuration by name (`fsid/configs`), or a YAML file; overrides on top."""
-    builtin = files("fsid.configs").joinpath(f"{name_or_file}.yaml")
-    if not builtin.is_file():
-        return load_settings(TrainConfig, Path(name_or_file), overrides)
-    with as_file(builtin) as file:
-        return load_settings(TrainConfig, file, overrides)
+    return load_named(TrainConfig, name_or_file, overrides)
