@@ -160,7 +160,7 @@ def test_rivals_trained_on_the_noise_of_other_cameras_are_not_gone_on_with(tmp_p
         (["ablation", "--seeds", "1", "1"], "give different ones"),
         (["real-vs-synthetic", "--photos", ".", "--test", "."], "test on other photographs"),
         (["ablation", "--camera", "nosuch"], "profile 'nosuch'"),
-        (["ablation", "--network", "nosuch"], "nosuch: cannot be read"),
+        (["ablation", "--network", "nosuch"], "nosuch: is no file and no built-in configuration"),
         (["ablation", "--set", "nokey=1"], "no such key: nokey"),
         (["ablation", "--set", "scene.objects=[1,2]", "variant=objects"], "--set variant: is no setting of"),
         (["ablation", "--set", "images=materials"], "--set images: is no setting of the scenes"),

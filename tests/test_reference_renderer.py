@@ -243,7 +243,7 @@ def test_a_mirror_shows_what_the_path_tracer_sees_in_it(mirror: str):
     shown = (drawn.object_id == -1) & (drawn.albedo.mean(-1) > 0.5)
     a, b = (gaussian_filter(frame.radiance.mean(-1) * shown, 1.0)[shown] for frame in (drawn, traced))
     assert np.corrcoef(a, b)[0, 1] > 0.85
-    assert np.median(a) / np.median(b) == pytest.approx(1.0, abs=0.2)
+    assert a.mean() / b.mean() == pytest.approx(1.0, abs=0.2)
 
 
 def glossy_floor(light: Light, family: str, roughness: float, grey: float = 0.5, **layers: float) -> Scene:
