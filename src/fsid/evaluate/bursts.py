@@ -142,8 +142,9 @@ def average(
     spread = np.where(used > 1, (square - total * change) / np.maximum(used - 1, 1), variance)
     noise2 = float(np.mean(spread / np.maximum(used, 1)))
     shared2 = float(np.mean([p.error2 for p in placed])) / 2
-    result = replace(_cut(first, window), mosaic=truth, noise=None)
-    error = float(np.sqrt(noise2 + shared2 + _misplacement2(result, _cut(first, window))))
+    seen = _cut(first, window)
+    result = replace(seen, mosaic=truth, noise=None)
+    error = float(np.sqrt(noise2 + shared2 + _misplacement2(result, seen)))
     quality = TruthQuality(
         image=image,
         level=level,

@@ -68,7 +68,8 @@ def _laces(length: float, t: np.ndarray, high: np.ndarray, half: np.ndarray) -> 
 def hat(rng: np.random.Generator) -> Parts:
     """Brimmed hat: crown with a dent, wavy brim, band."""
     radius = rng.uniform(0.08, 0.1)
-    tall, brim, _ = rng.uniform(0.07, 0.14), rng.uniform(1.3, 2.2), rng.random()
+    tall, brim = rng.uniform(0.07, 0.14), rng.uniform(1.3, 2.2)
+    rng.random()  # of no use any more, but without it every seed has another hat
     s = np.linspace(0, 1, 14)
     crown = np.c_[radius * (1 - 0.25 * s**3), s * tall]
     roof = np.c_[0.75 * radius * np.linspace(1, 0, 8), np.full(8, tall)]
