@@ -24,7 +24,7 @@ import zipfile
 import zlib
 from collections.abc import Callable, Iterable
 from contextlib import suppress
-from functools import cache
+from functools import cache, lru_cache
 from io import BytesIO
 from pathlib import Path
 from typing import TypeVar
@@ -150,10 +150,19 @@ def _read(path: Path) -> Arrays:
 
 def _array(member: bytes) -> np.ndarray:
     """The array of an .npy file, where it lies. Raises ValueError for one that would have to be unpickled."""
-    file = BytesIO(member)
+    start = 10 + int.from_bytes(member[8:10], "little")
+    shape, dtype = _shape(member[:start])
+    return np.frombuffer(member, dtype, offset=start).reshape(shape)
+
+
+@lru_cache(maxsize=256)
+def _shape(header: bytes) -> tuple[tuple[int, ...], np.dtype]:
+    """Shape and type in the head of an .npy file; there are few different ones, and parsing takes as long as
+    reading a small array."""
+    file = BytesIO(header)
     np.lib.format.read_magic(file)
     shape, _, dtype = np.lib.format.read_array_header_1_0(file)
-    return np.frombuffer(member, dtype, offset=file.tell()).reshape(shape)
+    return shape, dtype
 
 
 def _write(path: Path, arrays: Arrays, worth: float) -> None:
