@@ -71,7 +71,7 @@ def test_a_name_that_is_no_text_fails_no_command(photos: Path, tmp_path: Path, e
 def test_brackets_in_a_name_are_printed(photos: Path, capsys: pytest.CaptureFixture[str]) -> None:
     small = ["--count", "1", "--images", str(photos), "--width", "32", "--height", "32"]
     cli.main(["generate", "sets[a]/[/b]", *small, "--dry-run", "--quiet"])
-    assert capsys.readouterr().out.startswith("sets[a]/[/b]: 1 pairs in 1 shards")
+    assert capsys.readouterr().out.startswith("sets[a]/[/b]: 1 pair in 1 shard\n")
 
 
 def test_a_file_that_is_named_in_bytes_is_named_in_letters(

@@ -16,6 +16,7 @@ from tyro.conf import Positional
 from fsid.cli.iso_notes import note_extrapolation
 from fsid.cli.libraries import read_libraries
 from fsid.cli.progress import progress_bar
+from fsid.counted import counted
 from fsid.errors import FsidError
 
 if TYPE_CHECKING:
@@ -122,7 +123,7 @@ def generate(
         if not is_begun(out, dataset):
             _check_sources(settings, count, workforce, quiet=quiet)
         made = _make(out, settings, count, seed, workforce, quiet=quiet)
-        console.print(f"{out}: {count} pairs, {made} of them new", soft_wrap=True, markup=False)
+        console.print(f"{out}: {counted(count, 'pair')}, {made} of them new", soft_wrap=True, markup=False)
 
 
 def _check_sources(settings: GenerateConfig, count: int, workforce: Workforce, *, quiet: bool) -> None:
@@ -166,17 +167,17 @@ def _plan(
 
     left = pairs_to_make(out, dataset, count)
     if not left:
-        return f"{out}: all {count} pairs are there; nothing was written."
+        return f"{out}: has {counted(count, 'pair')} already; nothing was written."
     costs = estimate(settings, count=left, seed=dataset.seed, workforce=workforce)
     hours, minutes = divmod(round(costs.seconds / 60), 60)
     folder = next(path for path in (out, *out.absolute().parents) if path.exists())
     there = f"; {count - left} more are there" if left < count else ""
     free = shutil.disk_usage(folder).free
     return (
-        f"{out}: {costs.pairs} pairs in {costs.shards} shards{there}\n"
-        f"time   {hours} h {minutes:02d} min with {costs.workers} workers "
+        f"{out}: {counted(costs.pairs, 'pair')} in {counted(costs.shards, 'shard')}{there}\n"
+        f"time   {hours} h {minutes:02d} min with {counted(costs.workers, 'worker')} "
         f"({costs.seconds / costs.pairs:.3g} s per pair)\n"
         f"size   {costs.bytes / 1e9:.3g} GB ({costs.bytes / costs.pairs / 1e6:.3g} MB per pair), "
         f"{free / 1e9:.3g} GB are free\n"
-        f"An estimate from {costs.measured_pairs} pairs measured here; nothing was written."
+        f"An estimate from {counted(costs.measured_pairs, 'pair')} measured here; nothing was written."
     )

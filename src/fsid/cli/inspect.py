@@ -10,6 +10,7 @@ from rich.table import Table
 from tyro.conf import Positional
 
 from fsid.cli.progress import progress_bar
+from fsid.counted import counted
 
 
 def inspect(
@@ -49,7 +50,7 @@ def inspect(
         raise FsidError("--other needs --reference: it says how far two real sets lie apart")
     with progress_bar("pictures", "pictures", quiet=quiet) as progress:
         found = inspect_sets(data, reference, other, limit=limit, progress=progress)
-    table = Table(title=f"{data}: {found.pictures} pictures")
+    table = Table(title=f"{data}: {counted(found.pictures, 'picture')}")
     table.add_column("statistic")
     columns = ("mean", "reference", "distance", "relative") if reference else ("mean",)
     for column in columns:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from fsid.cli.progress import progress_bar
+from fsid.counted import counted
 
 if TYPE_CHECKING:
     from fsid.scene import SceneConfig
@@ -24,11 +25,11 @@ def read_libraries(config: SceneConfig, *, quiet: bool) -> None:
     for folder in config.mesh_folders:
         with progress_bar(f"reading {folder}", "meshes", quiet=quiet) as progress:
             meshes = survey_meshes(folder, config.mesh_folders_cc0_only, progress)
-        _tell(f"{folder}: {len(meshes.usable)} meshes", meshes.skipped, quiet=quiet)
+        _tell(f"{folder}: {counted(len(meshes.usable), 'mesh')}", meshes.skipped, quiet=quiet)
     for folder in config.texture_folders:
         with progress_bar(f"reading {folder}", "texture sets", quiet=quiet) as progress:
             sets = survey_textures(folder, progress)
-        _tell(f"{folder}: {len(sets.usable)} texture sets", sets.skipped, quiet=quiet)
+        _tell(f"{folder}: {counted(len(sets.usable), 'texture set')}", sets.skipped, quiet=quiet)
 
 
 def _tell(found: str, skipped: Sequence[tuple[str, str]], *, quiet: bool) -> None:

@@ -13,6 +13,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColum
 from rich.table import Column
 from rich.text import Text
 
+from fsid.counted import counted
 from fsid.pace import Pace
 
 
@@ -48,7 +49,7 @@ class Bar:
         """Something failed that will be tried again."""
         self._failures += 1
         self._bar.console.print(line, style="yellow", soft_wrap=True, markup=False)
-        self._bar.update(self._task, failures=f"{self._failures} failures")
+        self._bar.update(self._task, failures=counted(self._failures, "failure"))
 
 
 @contextmanager

@@ -20,6 +20,7 @@ from PIL import Image
 
 from fsid import __version__
 from fsid.assets.sources import survey_meshes
+from fsid.counted import counted
 from fsid.dataset.config import DatasetConfig
 from fsid.dataset.index import index_mosaics
 from fsid.dataset.picture import grid
@@ -88,15 +89,15 @@ def _text(dataset: DatasetConfig, tally: _Tally, statistics: Sequence[str], comm
     lowest, middle, highest = np.percentile(tally.isos, (0, 50, 100))
     size = f"{config.crop_width or config.width} x {config.crop_height or config.height}"
     if config.images:
-        sources, of_scenes = f"{len(tally.counts['picture'])} pictures", []
+        sources, of_scenes = counted(len(tally.counts["picture"]), "picture"), []
     else:
-        sources = f"{len(tally.frames)} rendered scenes"
+        sources = counted(len(tally.frames), "rendered scene")
         backgrounds = _listed(tally.counts.get("background", Counter()), "scenes")
         of_scenes = [f"| variant | {config.variant} |", f"| backgrounds | {backgrounds} |"]
     lines = [
         "# RAW pairs made by FSID",
         "",
-        f"{len(tally.isos)} pairs for {config.task}, {size} pixels at most, from {sources} "
+        f"{counted(len(tally.isos), 'pair')} for {config.task}, {size} pixels at most, from {sources} "
         f"(fsid {__version__}, seed {dataset.seed}). "
         "WebDataset shards; `config.yaml` has every setting, each pair's JSON all that makes it again.",
         "",
@@ -104,7 +105,7 @@ def _text(dataset: DatasetConfig, tally: _Tally, statistics: Sequence[str], comm
         "",
         "| | |",
         "|---|---|",
-        *(f"| {name} | {count} pairs |" for name, count in sorted(splits.items())),
+        *(f"| {name} | {counted(count, 'pair')} |" for name, count in sorted(splits.items())),
         f"| cameras | {_listed(tally.counts['camera'], 'pairs')} |",
         f"| ISO | {lowest:.0f} to {highest:.0f}, median {middle:.0f} |",
         *of_scenes,
@@ -128,10 +129,11 @@ def _sources(tally: _Tally) -> Iterable[str]:
         if own:
             yield f"- FSID's own {name} (Apache-2.0, made by formula): {_listed(own, 'uses')}."
         for folder, n in sorted(Counter(_folder(key) for key in (used - own).elements()).items()):
-            yield f"- {name} from `{folder}`: {n} uses. {_licence(what, Path(folder), used)}"
+            yield f"- {name} from `{folder}`: {counted(n, 'use')}. {_licence(what, Path(folder), used)}"
     pictures = tally.counts.get("picture", Counter())
     if pictures:
-        yield f"- {len(pictures)} pictures that the maker of this dataset supplied, under their own licences."
+        number = counted(len(pictures), "picture")
+        yield f"- {number} that the maker of this dataset supplied, under their own licences."
 
 
 def _statistics(out: Path) -> Iterable[str]:

@@ -41,6 +41,7 @@ from torch import Tensor
 from torch.utils.data import Dataset
 
 from fsid.config import as_read
+from fsid.counted import counted
 from fsid.dataset.cells import Cell, Grid, check_shrink, shrink_for
 from fsid.dataset.index import StoredMosaic, index_mosaics
 from fsid.dataset.levels import LevelTable
@@ -286,7 +287,9 @@ def _mosaics_of_split(
 ) -> tuple[StoredMosaic, ...]:
     found = index_mosaics(data_dir)
     if not 0 <= config.held_out < len(found):
-        raise FsidError(f"{data_dir}: has {len(found)} images; held_out {config.held_out} leaves none")
+        raise FsidError(
+            f"{data_dir}: has {counted(len(found), 'image')}; held_out {config.held_out} leaves none"
+        )
     held_out = {*without, *(mosaic.scene for mosaic in found[len(found) - config.held_out :])}
     wants_training = config.split == "train"
     kept = tuple(m for m in found if (m.split == "train" and m.scene not in held_out) == wants_training)

@@ -29,6 +29,7 @@ from rich.text import Text
 from torch import Tensor
 
 from fsid.config import as_read, read_yaml, to_plain
+from fsid.counted import counted
 from fsid.dataset.feed import batches
 from fsid.dataset.index import StoredMosaic, identity, index_mosaics
 from fsid.dataset.loader import Batch, PatchConfig, PatchDataset
@@ -234,7 +235,7 @@ class _Keeper:
 def _card(data_dir: Path, config: TrainConfig, images: int, initial: Denoiser | None) -> ModelCard:
     """The card of the network to come, without results."""
     file = data_dir / CONFIG_FILE
-    training = f"{images} images of {data_dir.resolve().name}"
+    training = f"{counted(images, 'image')} of {data_dir.resolve().name}"
     details = {"config": to_plain(config), "data": read_yaml(file) if file.is_file() else {}}
     if initial is not None:
         training += f" after {initial.card.training}"

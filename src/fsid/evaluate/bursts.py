@@ -25,6 +25,7 @@ from pathlib import Path
 import numpy as np
 from scipy.ndimage import shift, uniform_filter
 
+from fsid.counted import counted
 from fsid.errors import FsidError
 from fsid.evaluate.placing import LEAST_FRAMES, Placed, Window, green, misplaced, place, read_first, too_few
 from fsid.evaluate.testset import Progress, TestImage, TestSet, staged, write_testset
@@ -179,8 +180,8 @@ def _find_bursts(captures: Path, frames: int) -> dict[tuple[str, str], list[Path
         paths = sorted(p for p in files if p.suffix.lower() not in BESIDE_RAW)
         if len(paths) < frames + LEAST_FRAMES:
             raise FsidError(
-                f"{folder}: holds {len(paths)} frames; {frames} noisy and at least {LEAST_FRAMES} more for "
-                "the truth are needed (better 50)"
+                f"{folder}: holds {counted(len(paths), 'frame')}; {frames} noisy and at least "
+                f"{LEAST_FRAMES} more for the truth are needed (better 50)"
             )
         found[folder.parent.name, folder.name] = paths
     if not found:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
+from fsid.counted import counted
 from fsid.dataset.inspect_plot import as_label
 from fsid.evaluate.compare import Comparison, Crops, Row, confidence
 from fsid.evaluate.report import (
@@ -30,10 +31,10 @@ def comparison_sections(comparison: Comparison) -> list[Section]:
     """The tables, the plots over levels, and the crops side by side."""
     *single, whole = dict.fromkeys(row.set for row in comparison.rows)
     images = next(row.n for row in comparison.rows if row.set == whole)
-    counted = f" over the {len(single)} sets, since images of a set are alike" if single else ""
+    over_sets = f" over the {len(single)} sets, since images of a set are alike" if single else ""
     text = (
-        f"{'All sets together' if single else whole}: means over {images} images, ± half the width of the "
-        f"95 % confidence interval{counted}; bold is best."
+        f"{'All sets together' if single else whole}: means over {counted(images, 'image')}, ± half the "
+        f"width of the 95 % confidence interval{over_sets}; bold is best."
     )
     tables = tuple(_metric_table(comparison, whole, *metric) for metric in METRICS)
     sections = [

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from fsid.counted import counted
 from fsid.errors import FsidError
 from fsid.evaluate.compare import CLASSICAL, NOISY, Comparison, Method, compare, write_images, write_results
 from fsid.evaluate.comparison_report import comparison_sections
@@ -65,5 +66,5 @@ def write_comparison(comparison: Comparison, testset: Path, out: Path) -> None:
     write_results(comparison.rows, out / "results.json")
     write_images(comparison.images, out / "images.csv")
     made = comparison.testset
-    lead = f"{len(made.images)} images, {len(made.levels)} levels: {made.notes}."
+    lead = f"{counted(len(made.images), 'image')}, {counted(len(made.levels), 'level')}: {made.notes}."
     write_report(out / "report.html", f"FSID: {testset.name}", lead, comparison_sections(comparison))

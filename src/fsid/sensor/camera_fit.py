@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fsid.counted import counted
 from fsid.errors import FsidError
 from fsid.sensor.calibrate import (
     NoiseFit,
@@ -261,15 +262,15 @@ def _notes(reader: _Reader, isos: Sequence[float], fits: Sequence[NoiseFit]) -> 
         yield f"dark frames of ISO {', '.join(f'{i:g}' for i in sorted(unmatched))} have no bursts: unused"
     if reader.drifts_dn:
         yield (
-            f"the level of {len(reader.drifts_dn)} bursts drifted by up to {max(reader.drifts_dn):.2g} DN "
-            f"between frames (flicker, black level): compensated"
+            f"the level of {counted(len(reader.drifts_dn), 'burst')} drifted by up to "
+            f"{max(reader.drifts_dn):.2g} DN between frames (flicker, black level): compensated"
         )
     for paths, what in (
         (reader.moved, "something moved; that part of the image is left out"),
         (reader.saturated, "beyond 70 % of the range or without light; left out"),
     ):
         if paths:
-            yield f"{len(paths)} bursts, the first one that of {paths[0]}: {what}"
+            yield f"{counted(len(paths), 'burst')}, the first one that of {paths[0]}: {what}"
     for stated, measured, path in reader.blacks:
         source = "--black-level" if reader.found.camera.bare else "the files' black level"
         yield f"{path}: dark frames have a mean of {measured:.1f} DN, {source} is {stated}, which is kept"
