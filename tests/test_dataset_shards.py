@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from fsid.dataset import read_member, shard_keys, shard_path, write_shard
+from fsid.dataset.shards import find_shards
 from fsid.errors import FsidError
 
 
@@ -17,6 +18,17 @@ def test_what_is_written_is_read(tmp_path: Path):
     assert path.name == "shard-00003.tar"
     assert shard_keys(path) == ["a", "b"]
     assert read_member(path, "a.clean.dng") == b"22"
+
+
+def test_shards_come_in_the_order_of_their_numbers(tmp_path: Path):
+    """Names have five digits, and more from 100,000 on; sets put together have another number before."""
+    ordered = ["shard-0-00000.tar", "shard-2-00000.tar", "shard-10-00000.tar", "shard-00011.tar"]
+    ordered += ["shard-10001.tar", "shard-99999.tar", "shard-100000.tar", "shard-one.tar"]
+    for name in ordered:
+        (tmp_path / name).touch()
+    found = [shard.name for shard in find_shards(tmp_path)]
+    for part in (ordered[:3], ordered[3:]):
+        assert [name for name in found if name in part] == part
 
 
 def test_equal_samples_give_equal_bytes(tmp_path: Path):

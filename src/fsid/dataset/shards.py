@@ -10,6 +10,7 @@ from __future__ import annotations
 import io
 import json
 import os
+import re
 import socket
 import tarfile
 import time
@@ -45,14 +46,19 @@ def remove_parts(folder: Path, unused_s: float = 0) -> None:
 
 
 def find_shards(folder: str | Path) -> list[Path]:
-    """The finished shards of a dataset, in order; FsidError where there is none."""
+    """The finished shards of a dataset, in the order of their numbers; FsidError where there is none."""
     folder = Path(folder)
     if not folder.is_dir():
         raise FsidError(f"{folder}: is not a dataset folder (fsid generate makes one)")
-    shards = sorted(folder.glob("shard-*.tar"))
+    shards = sorted(folder.glob("shard-*.tar"), key=_in_order)
     if not shards:
         raise FsidError(f"{folder}: holds no shard-*.tar (fsid generate makes them)")
     return shards
+
+
+def _in_order(path: Path) -> list[str | int]:
+    """Digits count as numbers: shard-100000 comes after shard-99999."""
+    return [int(part) if part.isdecimal() else part for part in re.split(r"(\d+)", path.name)]
 
 
 def write_shard(path: str | Path, samples: Iterable[tuple[str, Mapping[str, bytes]]]) -> None:
