@@ -33,7 +33,7 @@ def export(
 
     done = export_network(run, output, precision)
     if not quiet:
-        agreement = f", differs from PyTorch by {done.difference:.1e}" if output.suffix == ".onnx" else ""
+        agreement = f", differs from PyTorch by {done.difference:.1e}" if done.difference else ""
         Console(stderr=True).print(
             f"{done.file}: {done.precision}, {done.file.stat().st_size / 1e6:.2f} MB{agreement}; "
             f"{done.psnr:.2f} dB on photographs, of which the precision costs {done.loss_db:.3f} dB",
