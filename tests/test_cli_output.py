@@ -137,6 +137,18 @@ def test_a_bar_gets_shorter_where_its_terminal_is_narrow_and_its_figures_do_not(
     assert "999/1000 99.9 pictures/s, 0:00:00 left" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("columns", ["30", "50"])
+def test_a_narrow_terminal_cuts_no_figure_of_a_table(
+    columns: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", columns)
+    cli.main(["profiles"])
+    listed = capsys.readouterr().out
+    for name in ("galaxy-s22-plus-front", "Samsung", "GRBG", "1023"):
+        assert name in listed
+    assert "…" not in listed
+
+
 def test_a_help_breaks_lines_where_its_terminal_does(capsys: pytest.CaptureFixture[str]) -> None:
     """And not where the source does."""
     with pytest.raises(SystemExit):

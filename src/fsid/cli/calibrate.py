@@ -12,6 +12,7 @@ from tyro.conf import Positional
 
 from fsid.cli.arguments import Output, black_levels
 from fsid.cli.progress import progress_bar
+from fsid.cli.tables import print_table
 
 if TYPE_CHECKING:
     from fsid.sensor.camera_fit import Calibration
@@ -84,7 +85,7 @@ def calibrate(
     write_together({**pictures, output: profile_file(found.profile)})
     for note in found.notes:
         Console(stderr=True, quiet=quiet).print(Text(f"note: {note}"), soft_wrap=True)
-    Console(quiet=quiet).print(_table(found))
+    print_table(_table(found), quiet=quiet)
 
 
 def _table(found: Calibration) -> Table:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rich.console import Console
 from rich.table import Column, Table
 from tyro.conf import Positional, UseAppendAction
 
 from fsid.cli.arguments import OptionalOutput
 from fsid.cli.iso_notes import note_files
 from fsid.cli.progress import progress_bar
+from fsid.cli.tables import print_table
 from fsid.files import check_folder
 
 
@@ -49,6 +49,6 @@ def evaluate(
         for method in dict.fromkeys(row.model for row in comparison.rows):
             rows = [row for row in comparison.rows if (row.set, row.model) == (name, method)]
             table.add_row(method, *(f"{r.psnr_raw:.2f} / {r.psnr:.2f} / {r.ssim:.3f}" for r in rows))
-        Console(markup=False).print(table)
+        print_table(table)
     if output is not None:
         write_comparison(comparison, testset, output)

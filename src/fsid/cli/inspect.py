@@ -10,6 +10,7 @@ from rich.table import Table
 from tyro.conf import Positional
 
 from fsid.cli.progress import progress_bar
+from fsid.cli.tables import print_table
 from fsid.counted import counted
 
 
@@ -63,10 +64,9 @@ def inspect(
             row += [f"{c.reference_mean:.4g}", f"{c.distance:.3f}"]
             row.append("" if math.isnan(c.yardstick) else f"{c.ratio:.1f}x")
         table.add_row(*row)
-    console = Console(markup=False)
-    console.print(table)
+    print_table(table)
     if found.yardstick:
-        console.print(f"relative: {found.yardstick}.")
+        Console(markup=False).print(f"relative: {found.yardstick}.")
     if out is not None:
         results = {
             out / "statistics.png": inspection_picture(found),

@@ -9,6 +9,7 @@ from rich.table import Column, Table
 from rich.text import Text
 from tyro.conf import Positional
 
+from fsid.cli.tables import print_table
 from fsid.errors import FsidError
 
 
@@ -25,7 +26,6 @@ def profiles(name: Positional[str | None] = None, *, plot: Path | None = None) -
 
     if plot is not None:
         check_picture(plot)
-    console = Console()
     if name is None:
         if plot is not None:
             raise FsidError("fsid profiles --plot: name the profile to plot")
@@ -36,9 +36,10 @@ def profiles(name: Positional[str | None] = None, *, plot: Path | None = None) -
             table.add_row(
                 known, Text(profile.camera), *levels, f"{min(profile.iso):g} .. {max(profile.iso):g}"
             )
-        console.print(table)
+        print_table(table)
         return
     profile = load_profile(name)
+    console = Console()
     integers = f"  CFA {profile.cfa}, DN {profile.black_level}..{profile.white_level}"
     console.print(Text(profile.camera, style="bold"), integers, sep="")
     console.print(
@@ -50,7 +51,7 @@ def profiles(name: Positional[str | None] = None, *, plot: Path | None = None) -
         level = profile.level(iso)
         k, sigma2 = sum(level.k) / 4, sum(level.sigma2) / 4
         table.add_row(f"{iso:g}", f"{k:.3e}", f"{sigma2:.3e}", f"{sigma2**0.5 * span:.2f}")
-    console.print(table)
+    print_table(table)
     console.print(Text(profile.source))
     if plot is not None:
         write_atomically(plot, profile_picture(profile, plot.suffix))

@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from rich.console import Console
 from rich.table import Column, Table
 from tyro.conf import Positional
 
 from fsid.cli.arguments import Output
 from fsid.cli.iso_notes import note_files
 from fsid.cli.progress import progress_bar
+from fsid.cli.tables import print_table
 from fsid.errors import FsidError
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ def testset(
     elif source == "from-bursts":
         with progress_bar("bursts", "bursts", quiet=quiet) as progress:
             made, found = burst_testset(folders[0], output, camera=camera, progress=progress, **given)
-        Console(markup=False).print(_table(found))
+        print_table(_table(found))
     else:
         isos = iso if iso or lux else DEFAULT_ISOS
         with progress_bar("photographs", "photographs", quiet=quiet) as progress:
