@@ -40,6 +40,19 @@ def test_a_pipe_that_broke_elsewhere_is_an_error(monkeypatch: pytest.MonkeyPatch
         cli.main([])
 
 
+def test_an_interrupt_while_modules_are_read_is_one_line() -> None:
+    script = (
+        "import sys, fsid.__main__\n"
+        "class Interrupt:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        "        if name == 'fsid.cli.main': raise KeyboardInterrupt\n"
+        "sys.meta_path.insert(0, Interrupt())\n"
+        "fsid.__main__.main()\n"
+    )
+    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert (ended.returncode, ended.stderr) == (130, "fsid: interrupted\n")
+
+
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no device that is always full")
 @pytest.mark.parametrize("arguments", [["--help"], ["profiles"], ["generate", "--help"]])
 def test_a_full_disk_under_the_output_is_one_line(arguments: list[str]) -> None:
