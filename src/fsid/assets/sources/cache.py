@@ -2,7 +2,8 @@
 
 A mesh is (key).npz, a refusal (key).txt with its reason. The key covers the file's place, size and time,
 those of the files that it refers to, and the version of the cleaning. Deleting the folder costs time and
-nothing else; a folder that cannot be written only makes the next process slower.
+nothing else; a folder that cannot be written only makes the next process slower. Its size has no limit, as
+every process asks for the measures of a whole library: a limit below would have them all read anew each time.
 
 The folder is $FSID_CACHE/meshes, or $XDG_CACHE_HOME/fsid/meshes, or ~/.cache/fsid/meshes; FSID_CACHE=off
 keeps no files.
