@@ -17,6 +17,7 @@ from fsid.assets.sources import load_source, mesh_sources, survey_meshes
 from fsid.assets.sources.cleaning import KEPT_PARTS, KEPT_TRIANGLES, Triangles, clean
 from fsid.assets.sources.polygons import triangulated
 from fsid.assets.surfaces import face_areas
+from fsid.assets.survey import KNOWN
 from fsid.errors import FsidError
 
 FURNITURE = Path("/usr/share/sweethome3d/furniture")
@@ -27,7 +28,7 @@ CATALOGUE = "PluginFurnitureCatalog.properties"
 def own_cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder = tmp_path_factory.mktemp("cache")
     monkeypatch.setenv("FSID_CACHE", str(folder))
-    survey_meshes.cache_clear()
+    KNOWN.clear()
     return folder
 
 

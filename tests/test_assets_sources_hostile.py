@@ -17,6 +17,7 @@ import trimesh
 
 from fsid.assets.sources import mesh_sources, survey_meshes
 from fsid.assets.sources.catalogue import CATALOGUE
+from fsid.assets.survey import KNOWN
 
 GOOD = trimesh.creation.box((0.2, 0.3, 0.4))
 SECONDS = 5.0
@@ -25,7 +26,7 @@ SECONDS = 5.0
 @pytest.fixture(autouse=True)
 def no_cache(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("FSID_CACHE", "off")
-    survey_meshes.cache_clear()
+    KNOWN.clear()
 
 
 def refused(folder: Path) -> str:

@@ -14,6 +14,7 @@ from PIL import Image
 from fsid.assets import bake_material, material_colours, material_tile_m, survey_textures, texture_sources
 from fsid.assets import texture_files as files
 from fsid.assets.patterns import noise
+from fsid.assets.survey import KNOWN
 from fsid.assets.textures import TILE_M, integrated, slopes_of
 from fsid.assets.triangle import decode, enclosing, encode, hex_colours, srgb_to_linear
 from fsid.errors import FsidError
@@ -24,7 +25,7 @@ SIZE = 128
 @pytest.fixture(autouse=True)
 def own_cache(tmp_path_factory, monkeypatch):
     monkeypatch.setenv("FSID_CACHE", str(tmp_path_factory.mktemp("cache")))
-    survey_textures.cache_clear()
+    KNOWN.clear()
 
 
 def picture(seed: int = 0, size: int = SIZE) -> np.ndarray:
@@ -181,7 +182,7 @@ def test_the_maps_of_painting_programs_are_those_of_the_set(tmp_path, normal):
 
 def test_pictures_of_no_set_are_listed_with_the_reason(folder):
     usable = texture_sources(folder)
-    survey_textures.cache_clear()
+    KNOWN.clear()
     for name in ("x_Color.tif", "y_Color.webp", "z_Color.tga", "holiday.jpg", "Metal002_2K-PNG_Sheen.png"):
         (folder / name).write_bytes(b"")
     passed_over = ("Metal002.png", "rock_wall/rock_wall.png", "Metal002_2K-PNG_AmbientOcclusion.png")
@@ -313,7 +314,7 @@ def bomb(width: int, height: int) -> bytes:
 def test_broken_hostile_and_huge_images_are_skipped_and_counted(folder, monkeypatch):
     monkeypatch.setattr(files, "MAX_FILE_BYTES", 200_000)
     good = len(texture_sources(folder))
-    survey_textures.cache_clear()
+    KNOWN.clear()
     truncated = (folder / "rock_wall" / "rock_wall_diff_1k.png").read_bytes()[:2000]
     bad = {
         "truncated_diff_1k.png": truncated,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pickle
 import re
 import shutil
 import time
@@ -12,11 +13,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from fsid.assets import mesh_sources, texture_sources
+from fsid.assets.survey import KNOWN
 from fsid.cli.libraries import read_libraries
 from fsid.cli.main import main
 from fsid.cli.progress import progress_bar
 from fsid.config import read_yaml
-from fsid.dataset import contact_sheet, generate_config, make_only, shard_path, write_shard
+from fsid.dataset import Workforce, contact_sheet, generate_config, make_only, shard_path, write_shard
 from fsid.dataset.index import index_mosaics
 from fsid.dataset.sample import make_sample, to_uint8
 from fsid.dataset.shards import read_samples
@@ -24,6 +27,7 @@ from fsid.errors import FsidError
 from fsid.scene import SceneConfig
 from fsid.sensor import develop
 
+TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 REPOSITORY = Path(__file__).resolve().parents[1]
 
 
@@ -139,9 +143,7 @@ def test_a_contact_sheet_has_room_for_upright_photographs(tmp_path: Path) -> Non
 def test_meshes_that_are_skipped_are_counted_and_the_first_is_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (tmp_path / "good.obj").write_text(
-        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
-    )
+    (tmp_path / "good.obj").write_text(TETRAHEDRON)
     (tmp_path / "junk.ply").write_bytes(b"junk")
     read_libraries(SceneConfig(mesh_folders=(str(tmp_path),)), quiet=False)
     said = capsys.readouterr().err
@@ -163,6 +165,35 @@ def test_texture_sets_are_read_behind_a_bar_before_the_first_pair(
     said = " ".join(capsys.readouterr().err.split())
     assert "reading" in said
     assert f"{tmp_path}: 1 texture set, 1 skipped, first {tmp_path}/wall_Normal.png: wall_Normal" in said
+
+
+def test_panoramas_that_are_skipped_are_counted_and_the_first_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    good = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 16 +X 32\n" + bytes([128]) * (16 * 32 * 4)
+    (tmp_path / "good.hdr").write_bytes(good)
+    (tmp_path / "page.hdr").write_text("<html>404</html>")
+    read_libraries(SceneConfig(hdri_folder=str(tmp_path)), quiet=False)
+    said = " ".join(capsys.readouterr().err.split())
+    assert f"{tmp_path}: 1 panorama, 1 skipped, first {tmp_path}/page.hdr: is no Radiance" in said
+
+
+def test_folders_are_surveyed_once_and_workers_are_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Every file was read and hashed again by the sampler, and by each new worker."""
+    Image.new("RGB", (16, 16), (90, 120, 60)).save(tmp_path / "wall_Color.png")
+    (tmp_path / "cube.obj").write_text(TETRAHEDRON)
+    folder = str(tmp_path)
+    read_libraries(SceneConfig(mesh_folders=(folder,), texture_folders=(folder,)), quiet=True)
+    make_worker = pickle.dumps(Workforce().crew(1)._make_work)
+    for module in ("textures", "sources.library"):
+        monkeypatch.setattr(f"fsid.assets.{module}._survey", None)
+    for _ in range(2):
+        assert texture_sources(folder) == (f"file:{tmp_path}/wall",)
+        assert mesh_sources(folder) == (f"file:{tmp_path}/cube.obj",)
+        KNOWN.clear()
+        pickle.loads(make_worker)(None)  # as in a new process
 
 
 @pytest.mark.parametrize(

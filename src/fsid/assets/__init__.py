@@ -24,7 +24,7 @@ from fsid.assets.registry import (
 )
 from fsid.assets.skies import sky_sources, survey_skies
 from fsid.assets.sources import mesh_sources, survey_meshes
-from fsid.assets.textures import TextureSurvey, survey_textures, texture_sources
+from fsid.assets.textures import survey_textures, texture_sources
 
 __all__ = [
     "BACKGROUND_PARTS",
@@ -32,7 +32,6 @@ __all__ = [
     "PART_KINDS",
     "MaterialMaps",
     "Mesh",
-    "TextureSurvey",
     "bake_material",
     "build_background",
     "build_mesh",

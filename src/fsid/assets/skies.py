@@ -10,11 +10,10 @@ from __future__ import annotations
 
 import os
 import re
-from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 
 from fsid.assets.file_names import NOT_TEXT, shown
+from fsid.assets.survey import Skipped, Survey, surveyed
 from fsid.errors import FsidError
 
 SKY_SUFFIXES = (".hdr", ".exr")
@@ -25,25 +24,21 @@ _HEADER_BYTES = 65536
 _RADIANCE = re.compile(rb"#\?.*?\n\n-Y (\d{1,6}) \+X (\d{1,6})\n", re.DOTALL)
 
 
-@dataclass(frozen=True)
-class SkySurvey:
-    """usable: names for `Sky.source`, sorted. skipped: (name, reason) of all others."""
-
-    usable: tuple[str, ...]
-    skipped: tuple[tuple[str, str], ...]
-
-
 def sky_sources(folder: str | os.PathLike[str]) -> tuple[str, ...]:
     """Names of the usable panoramas below a folder, for `Sky.source`. See `survey_skies`."""
     return survey_skies(os.fspath(folder)).usable
 
 
-@lru_cache(maxsize=32)
-def survey_skies(folder: str) -> SkySurvey:
+def survey_skies(folder: str) -> Survey[str]:
     """Every .hdr and .exr of a folder and its subfolders; links to folders are not followed.
 
-    Raises FsidError where there is none to use.
+    usable: names for `Sky.source`, sorted. Raises FsidError where there is none.
     """
+    nothing = f"{folder}: holds no panorama ({', '.join(SKY_SUFFIXES)})"
+    return surveyed(("skies", folder), lambda: _survey(folder), nothing)
+
+
+def _survey(folder: str) -> tuple[list[str], list[Skipped]]:
     if not Path(folder).is_dir():
         raise FsidError(f"{folder}: there is no such folder of skies")
     usable, skipped = [], []
@@ -54,10 +49,7 @@ def survey_skies(folder: str) -> SkySurvey:
             skipped.append((shown(f"file:{path}"), reason))
         else:
             usable.append(f"file:{path}")
-    if not usable:
-        why = f"; the first of {len(skipped)} skipped: {skipped[0][1]}" if skipped else ""
-        raise FsidError(f"{folder}: holds no panorama ({', '.join(SKY_SUFFIXES)}){why}")
-    return SkySurvey(tuple(usable), tuple(skipped))
+    return usable, skipped
 
 
 def _flaw(path: Path) -> str:

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
@@ -23,6 +22,7 @@ from scipy.fft import irfft2, rfft2
 from fsid.assets.bake_cache import cached, code_key, content_key
 from fsid.assets.file_names import NOT_TEXT, shown
 from fsid.assets.maps import MaterialMaps
+from fsid.assets.survey import Skipped, Survey, surveyed
 from fsid.assets.texture_files import (
     RefusedImageError,
     TextureSet,
@@ -49,29 +49,25 @@ _CODE = tuple(
 )
 
 
-@dataclass(frozen=True)
-class TextureSurvey:
-    """usable: names for `Material.family`, sorted. skipped: (name, reason) of all other sets, and of pictures
-    that are of no set."""
-
-    usable: tuple[str, ...]
-    skipped: tuple[tuple[str, str], ...]
-
-
 def texture_sources(path: str | os.PathLike[str]) -> tuple[str, ...]:
     """Names of all usable texture sets below a folder, for `Material.family`. See `survey_textures`."""
     return survey_textures(os.fspath(path)).usable
 
 
-@lru_cache(maxsize=32)
 def survey_textures(
     path: str, progress: Callable[[int, int], None] = lambda done, total: None
-) -> TextureSurvey:
+) -> Survey[str]:
     """Every texture set of a folder and its subfolders, each read once.
 
-    progress: called with the number of sets done and of all. Raises FsidError where `path` is no folder or
-    holds no usable set.
+    usable: names for `Material.family`, sorted. skipped: also pictures that are of no set. progress: called
+    with the number of sets done and of all. Raises FsidError where `path` is no folder or holds no usable
+    set.
     """
+    nothing = f"{path}: no usable texture set (ambientCG or Poly Haven file names)"
+    return surveyed(("textures", path), lambda: _survey(path, progress), nothing)
+
+
+def _survey(path: str, progress: Callable[[int, int], None]) -> tuple[list[str], list[Skipped]]:
     if not Path(path).is_dir():
         raise FsidError(f"{path}: there is no such folder of textures")
     usable, skipped = [], []
@@ -89,10 +85,7 @@ def survey_textures(
             skipped.append((name, str(error)))
     progress(len(sets), len(sets))
     skipped += [(shown(f"{PREFIX}{file}"), shown(why)) for file, why in strangers_below(Path(path))]
-    if not usable:
-        why = f"; the first of {len(skipped)} skipped: {skipped[0][1]}" if skipped else ""
-        raise FsidError(f"{path}: no usable texture set (ambientCG or Poly Haven file names){why}")
-    return TextureSurvey(tuple(usable), tuple(skipped))
+    return usable, skipped
 
 
 def bake_texture(name: str, size: int) -> MaterialMaps:

@@ -1,4 +1,4 @@
-"""The user's own meshes and textures are read before anything is made of them: it takes minutes, once."""
+"""The user's own files are read before anything is made of them: it takes minutes, once."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ if TYPE_CHECKING:
 
 
 def read_libraries(config: SceneConfig, *, quiet: bool) -> None:
-    """Fill the cache with every mesh of `config.mesh_folders` and every set of `config.texture_folders`; say
-    how many were skipped, and why the first.
+    """Fill the cache with every mesh of `config.mesh_folders` and every set of `config.texture_folders`, look
+    at the panoramas; say how many were skipped, and why the first.
 
     Raises FsidError for a folder without a usable one.
     """
-    from fsid.assets import survey_meshes, survey_textures
+    from fsid.assets import survey_meshes, survey_skies, survey_textures
 
     for folder in config.mesh_folders:
         with progress_bar(f"reading {folder}", "meshes", quiet=quiet) as progress:
@@ -30,6 +30,9 @@ def read_libraries(config: SceneConfig, *, quiet: bool) -> None:
         with progress_bar(f"reading {folder}", "texture sets", quiet=quiet) as progress:
             sets = survey_textures(folder, progress)
         _tell(f"{folder}: {counted(len(sets.usable), 'texture set')}", sets.skipped, quiet=quiet)
+    if config.hdri_folder and config.background.kind_shares[-1]:  # else there is no sky
+        skies = survey_skies(config.hdri_folder)
+        _tell(f"{config.hdri_folder}: {counted(len(skies.usable), 'panorama')}", skies.skipped, quiet=quiet)
 
 
 def _tell(found: str, skipped: Sequence[tuple[str, str]], *, quiet: bool) -> None:

@@ -11,9 +11,11 @@ import operator
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from fsid.assets import sky_sources
+from fsid.assets.survey import KNOWN
 from fsid.config import as_read, from_plain, read_yaml, save_settings, to_plain
 from fsid.dataset.card import CARD, write_card
 from fsid.dataset.config import RENDERED, DatasetConfig, GenerateConfig
@@ -54,12 +56,12 @@ class Workforce:
 
     def crew(self, tasks: int) -> Crew:
         """As many workers as `tasks` can use, which share the cores; none of them started."""
-        size = min(self.workers, tasks)
+        size, make_worker = min(self.workers, tasks), partial(Worker, surveys=dict(KNOWN))
         if not self.ray:
-            return LocalCrew(size, Worker, self.workers_per_gpu)
+            return LocalCrew(size, make_worker, self.workers_per_gpu)
         from fsid.dataset.ray_crew import RayCrew
 
-        return RayCrew(self.ray, size, Worker, self.workers_per_gpu)
+        return RayCrew(self.ray, size, make_worker, self.workers_per_gpu)
 
 
 @dataclass(frozen=True)

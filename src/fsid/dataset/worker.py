@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from typing import Any, Protocol
 
+from fsid.assets.survey import KNOWN, Survey
 from fsid.dataset.config import GenerateConfig
 from fsid.dataset.tasks import SceneRenderer
 from fsid.render import Renderer, gpu_device
 
 
 class Worker:
-    """gpu: number of its GPU; None takes the first there is. Calling it does one task."""
+    """gpu: number of its GPU; None takes the first there is. Calling it does one task.
 
-    def __init__(self, gpu: int | None) -> None:
+    surveys: what its parent knows of folders of meshes, textures and skies.
+    """
+
+    def __init__(self, gpu: int | None, surveys: Mapping[tuple[str, ...], Survey[Any]]) -> None:
+        KNOWN.update(surveys)
         self._gpu = gpu
         self._open = ExitStack()
         self._renderer: SceneRenderer | None = None

@@ -3,10 +3,9 @@
 from fsid.assets.sources.library import (
     PREFIX,
     MeshSource,
-    Survey,
     load_source,
     mesh_sources,
     survey_meshes,
 )
 
-__all__ = ["PREFIX", "MeshSource", "Survey", "load_source", "mesh_sources", "survey_meshes"]
+__all__ = ["PREFIX", "MeshSource", "load_source", "mesh_sources", "survey_meshes"]

@@ -35,6 +35,7 @@ from fsid.assets.sources.cleaning import Triangles, clean
 from fsid.assets.sources.gltf_file import referred
 from fsid.assets.sources.limits import MAX_FILE_BYTES, NotNowError, RefusedError
 from fsid.assets.sources.reading import MESH_SUFFIXES, read_triangles
+from fsid.assets.survey import Skipped, Survey, surveyed
 from fsid.errors import FsidError
 
 PREFIX = "file:"
@@ -62,28 +63,26 @@ class MeshSource:
     triangles: int
 
 
-@dataclass(frozen=True)
-class Survey:
-    """usable: in a fixed order. skipped: (name, reason) of all others."""
-
-    usable: tuple[MeshSource, ...]
-    skipped: tuple[tuple[str, str], ...]
-
-
 def mesh_sources(path: str | os.PathLike[str], *, cc0_only: bool = False) -> tuple[str, ...]:
     """Names of all usable meshes of a folder or library, for `Object.family`. See `survey_meshes`."""
     return tuple(source.name for source in survey_meshes(os.fspath(path), cc0_only).usable)
 
 
-@lru_cache(maxsize=32)
 def survey_meshes(
     path: str, cc0_only: bool = False, progress: Callable[[int, int], None] = lambda done, total: None
-) -> Survey:
+) -> Survey[MeshSource]:
     """Every mesh of a folder (with its subfolders), of one library or of one file, each read once.
 
     cc0_only: leave out what is not stated to be in the public domain (CC0). progress: called with the number
     of meshes done and of all. Raises FsidError where `path` does not exist or holds no usable mesh.
     """
+    nothing = f"{path}: no usable mesh ({', '.join((*MESH_SUFFIXES, LIBRARY_SUFFIX))})"
+    return surveyed(("meshes", path, str(cc0_only)), lambda: _survey(path, cc0_only, progress), nothing)
+
+
+def _survey(
+    path: str, cc0_only: bool, progress: Callable[[int, int], None]
+) -> tuple[list[MeshSource], list[Skipped]]:
     if not Path(path).exists():
         raise FsidError(f"{path}: there is no such folder or file of meshes")
     found, skipped = _candidates(Path(path))
@@ -103,10 +102,7 @@ def survey_meshes(
             continue
         usable.append(MeshSource(name, licence, (float(x), float(y), float(z)), int(triangles)))
     progress(len(found), len(found))
-    if not usable:
-        why = f"; the first of {len(skipped)} skipped: {skipped[0][1]}" if skipped else ""
-        raise FsidError(f"{path}: no usable mesh ({', '.join((*MESH_SUFFIXES, LIBRARY_SUFFIX))}){why}")
-    return Survey(tuple(usable), tuple(skipped))
+    return usable, skipped
 
 
 def load_source(name: str) -> Mesh:
@@ -154,10 +150,10 @@ def _split(name: str) -> tuple[Path, str]:
     return (Path(parts[1]), parts[2]) if parts else (Path(text), "")
 
 
-def _candidates(path: Path) -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
+def _candidates(path: Path) -> tuple[list[tuple[str, str]], list[Skipped]]:
     """(name, licence) of what may be a mesh, and (name, reason) of libraries that cannot be opened."""
     found: list[tuple[str, str]] = []
-    skipped: list[tuple[str, str]] = []
+    skipped: list[Skipped] = []
     for file in _files(path):
         if file.suffix.lower() != LIBRARY_SUFFIX:
             found.append((f"{PREFIX}{file}", _licence_beside(file.parent, path)))
