@@ -255,10 +255,10 @@ def test_only_names_what_is_wrong(
 def test_a_dry_run_estimates_and_writes_nothing(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
     main([*words(data)[:-1], "--count", "5", "--dry-run"])
     before = sorted(path.name for path in (data / "data").iterdir())
-    main([*words(data)[:-1], "--count", "160", "--dry-run", "--workers", "2"])
+    main([*words(data)[:-1], "--count", "165", "--dry-run", "--workers", "2"])
     assert sorted(path.name for path in (data / "data").iterdir()) == before
     text = capsys.readouterr().out
-    assert "160 pairs in 10 shards" in text
+    assert "160 pairs in 11 shards; 5 more are there" in text
     per_pair_mb = [float(mb) for mb in re.findall(r"([\d.e+-]+) MB per pair", text)]
     assert re.search(r"time   0 h \d\d min with 2 workers \([\d.e-]+ s per pair\)", text)
     stored_mb = shard_path(data / "data", 0).stat().st_size / 5e6

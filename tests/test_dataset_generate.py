@@ -29,11 +29,14 @@ from fsid.dataset import (
     make_frame,
     make_only,
     make_sample,
+    pairs_to_make,
     read_member,
     scene_of,
     shard_keys,
     shard_path,
+    write_shard,
 )
+from fsid.dataset.shards import read_samples
 from fsid.errors import FsidError
 from fsid.sensor import NoiseTerms, load_profile, save_profile
 from fsid.sensor.light import LONGEST_EXPOSURE_S
@@ -84,8 +87,22 @@ def test_a_shard_that_was_cut_between_two_files_is_made_again(scenes: Path, tmp_
     with tarfile.open(path) as tar:
         (end,) = (member.offset for member in tar if member.name == "00000003.json")
     path.write_bytes(whole[:end])
-    assert generate(out, small(), count=4, seed=7, shard_size=2) == 2
+    assert generate(out, small(), count=4, seed=7, shard_size=2) == 1
     assert path.read_bytes() == whole
+
+
+def test_a_larger_count_keeps_the_whole_frames_of_a_shard_that_was_not_full(photos: Path, tmp_path: Path):
+    config = small("width=64", "height=48", "crops=3", "crop_width=32", "crop_height=32", f"images={photos}")
+    generate(tmp_path / "at-once", config, count=8, shard_size=9)
+    generate(tmp_path / "grown", config, count=5, shard_size=9)
+    path, mark = shard_path(tmp_path / "grown", 0), {"mark.txt": b"kept"}
+    write_shard(path, [(key, mark | files) for key, files in read_samples(path).items()])
+    assert pairs_to_make(tmp_path / "grown", dataset_config(config, 0, 9), 8) == (5, 1)
+    assert generate(tmp_path / "grown", config, count=8, shard_size=9) == 5
+    expected = read_samples(shard_path(tmp_path / "at-once", 0))
+    for key in ("00000000", "00000001", "00000002"):  # of the second frame there were two pairs of three
+        expected[key] |= mark
+    assert read_samples(path) == expected
 
 
 def test_another_seed_gives_other_pictures(scenes: Path, tmp_path: Path):
@@ -213,7 +230,7 @@ def test_dark_current_flows_for_the_longest_exposure(photos: Path, tmp_path: Pat
 def test_photographs_are_the_same_data_whatever_scenes_would_be(photos: Path, tmp_path: Path):
     """So data made before the defaults of scenes changed is gone on with."""
     generate(tmp_path, small(f"images={photos}", "scene.objects=[3, 4]", "variant=objects"), count=1)
-    assert generate(tmp_path, small(f"images={photos}"), count=2) == 2
+    assert generate(tmp_path, small(f"images={photos}"), count=2) == 1
     with pytest.raises(FsidError, match=r"generate\.iso_range"):
         generate(tmp_path, small(f"images={photos}", "iso_range=[100, 200]"), count=2)
 
@@ -292,7 +309,7 @@ def test_pictures_that_changed_are_not_mixed_into_a_dataset(album: Path, tmp_pat
         with pytest.raises(FsidError, match="album: holds other pictures"):
             make_only(out, key, None, None)
     pixels.save(first)
-    assert generate(out, config, count=4) == 4
+    assert generate(out, config, count=4) == 2
     first.rename(album / "later.png")
     with pytest.raises(FsidError, match="album: holds other pictures"):
         generate(out, config, count=6)
@@ -310,7 +327,7 @@ def test_a_dataset_of_before_pictures_were_told_apart_goes_on(album: Path, tmp_p
     old = yaml.safe_dump(plain)
     (out / "config.yaml").write_text(old)
     (album / "coffee-0.png").rename(album / "coffee.png")
-    assert generate(out, config, count=2) == 2
+    assert generate(out, config, count=2) == 1
     assert make_only(out, "1", None, None)
     assert (out / "config.yaml").read_text() == old
     (album / "coffee.png").unlink()
@@ -322,7 +339,7 @@ def test_a_folder_of_pictures_may_move(album: Path, tmp_path: Path):
     out, config = tmp_path / "out", small(f"images={album}")
     generate(out, config, count=1)
     moved = album.rename(tmp_path / "elsewhere")
-    assert generate(out, replace(config, images=str(moved)), count=2) == 2
+    assert generate(out, replace(config, images=str(moved)), count=2) == 1
     (moved / "coffee-0.png").rename(moved / "coffee.png")
     with pytest.raises(FsidError, match="already holds another dataset"):
         generate(out, replace(config, images=str(moved)), count=3)

@@ -165,10 +165,10 @@ def _plan(
     """What a dry run says: time, size and number of shards of what `out` lacks, from a few pairs."""
     from fsid.dataset import estimate, pairs_to_make
 
-    left = pairs_to_make(out, dataset, count)
+    left, shards = pairs_to_make(out, dataset, count)
     if not left:
         return f"{out}: has {counted(count, 'pair')} already; nothing was written."
-    costs = estimate(settings, count=left, seed=dataset.seed, workforce=workforce)
+    costs = estimate(settings, count=left, seed=dataset.seed, workforce=workforce, shards=shards)
     hours, minutes = divmod(round(costs.seconds / 60), 60)
     folder = next(path for path in (out, *out.absolute().parents) if path.exists())
     there = f"; {count - left} more are there" if left < count else ""

@@ -56,10 +56,15 @@ class _Trial:
         return sum(_TAR_BLOCK - len(data) // -_TAR_BLOCK * _TAR_BLOCK for data in files), len(samples)
 
 
-def estimate(config: GenerateConfig, *, count: int, seed: int, workforce: Workforce) -> Estimate:
-    """Cost of `count` samples made by `workforce`; writes nothing. FsidError as in `generate`."""
+def estimate(
+    config: GenerateConfig, *, count: int, seed: int, workforce: Workforce, shards: int = 0
+) -> Estimate:
+    """Cost of `count` samples made by `workforce`; writes nothing. FsidError as in `generate`.
+
+    shards: in which they are; 0: those of a new dataset.
+    """
     dataset = dataset_config(config, seed)
-    shards = -(-count // dataset.shard_size)
+    shards = shards or -(-count // dataset.shard_size)
     workers = min(workforce.workers, shards)
     trials = [_Trial(config, seed, (1 + FRAMES) * worker) for worker in range(workers)]
     results = [result for _, result in run(workforce.crew(workers), trials, tasks_per_worker=workers)]

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import chain
 from pathlib import Path
 
 from fsid.assets import sky_sources
@@ -23,7 +24,7 @@ from fsid.dataset.crew import Crew, LocalCrew, run
 from fsid.dataset.pictures import find_pictures, pictures_digest
 from fsid.dataset.sample import encode, make_frame
 from fsid.dataset.settle import Settle, settle
-from fsid.dataset.shards import count_whole, remove_parts, shard_path, write_shard
+from fsid.dataset.shards import count_whole, read_samples, remove_parts, shard_path, write_shard
 from fsid.dataset.tasks import check_cameras, check_task
 from fsid.dataset.worker import Worker
 from fsid.errors import FsidError
@@ -66,7 +67,10 @@ class Workforce:
 
 @dataclass(frozen=True)
 class _Shard:
+    """kept: so many samples, of whole frames, are there already. indices: of the others."""
+
     path: Path
+    kept: int
     indices: range
     dataset: DatasetConfig
 
@@ -74,8 +78,9 @@ class _Shard:
         return self.path.name
 
     def do(self, worker: Worker) -> int:
-        """Write the shard; number of its samples."""
-        write_shard(self.path, self._samples(worker))
+        """Write the shard; number of its new samples."""
+        kept = list(read_samples(self.path).items())[: self.kept] if self.kept else []
+        write_shard(self.path, chain(kept, self._samples(worker)))
         return len(self.indices)
 
     def _samples(self, worker: Worker) -> Iterator[tuple[str, dict[str, bytes]]]:
@@ -138,10 +143,14 @@ def generate(
     return total
 
 
-def pairs_to_make(out: Path, dataset: DatasetConfig, count: int) -> int:
-    """How many of the first `count` pairs `out` lacks, in whole shards; FsidError where it holds others."""
+def pairs_to_make(out: Path, dataset: DatasetConfig, count: int) -> tuple[int, int]:
+    """How many of the first `count` pairs `out` lacks, in whole frames, and in how many shards they are.
+
+    FsidError where it holds others.
+    """
     is_begun(out, dataset)
-    return sum(len(shard.indices) for shard in _missing(out, dataset, count))
+    missing = list(_missing(out, dataset, count))
+    return sum(len(shard.indices) for shard in missing), len(missing)
 
 
 def dataset_config(config: GenerateConfig, seed: int, shard_size: int = 0) -> DatasetConfig:
@@ -250,5 +259,7 @@ def _missing(out: Path, dataset: DatasetConfig, count: int) -> Iterator[_Shard]:
     for number, start in enumerate(range(0, count, size)):
         indices = range(start, min(start + size, count))
         path = shard_path(out, number)
-        if not path.exists() or count_whole(path) < len(indices):
-            yield _Shard(path, indices, dataset)
+        there = count_whole(path) if path.exists() else 0
+        if there < len(indices):
+            kept = there - there % dataset.generate.pairs_per_frame
+            yield _Shard(path, kept, indices[kept:], dataset)
