@@ -256,6 +256,11 @@ def test_bad_renders_are_named(tmp_path: Path) -> None:
         broken.write_bytes(whole[:size])
         with pytest.raises(FsidError, match=r"broken\.exr: cannot be read as OpenEXR, it is truncated"):
             read_exr(broken)
+    start = whole.index(b"dataWindow\0box2i\0") + len(b"dataWindow\0box2i\0") + 4
+    last = (19999).to_bytes(4, "little")
+    broken.write_bytes(whole[: start + 8] + last + last + whole[start + 16 :])
+    with pytest.raises(FsidError, match=r"broken\.exr: is 20000x20000 pixels, more than 128 million"):
+        read_exr(broken)
     write_exr(tmp_path / "small.exr", np.ones((8, 64, 3), np.float32))
     with pytest.raises(FsidError, match=r"small\.exr: is 64x8"):
         read_exr(tmp_path / "small.exr")

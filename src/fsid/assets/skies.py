@@ -12,6 +12,7 @@ import os
 import re
 from pathlib import Path
 
+from fsid.assets.exr import stated_size
 from fsid.assets.file_names import NOT_TEXT, shown
 from fsid.assets.survey import Skipped, Survey, surveyed
 from fsid.errors import FsidError
@@ -92,6 +93,5 @@ def exr_size(path: Path) -> tuple[int, int] | None:
 
     with OpenEXR.File(str(path), header_only=True) as file:
         header = file.header()
-        (left, top), (right, bottom) = (corner.tolist() for corner in header["dataWindow"])
         names = {channel.name for channel in header["channels"]}
-    return (right - left + 1, bottom - top + 1) if {"R", "G", "B"} <= names else None
+        return stated_size(header) if {"R", "G", "B"} <= names else None

@@ -24,6 +24,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, UnidentifiedImageError
 
+from fsid.assets.exr import stated_size
+
 MAX_FILE_BYTES = 128 * 2**20
 MAX_PIXELS = 8192 * 8192
 
@@ -151,8 +153,7 @@ def decode_exr(path: Path) -> np.ndarray:
 
     try:
         with OpenEXR.File(str(path), header_only=True) as file:
-            low, high = (np.asarray(corner, np.int64) for corner in file.header()["dataWindow"])
-        width, height = (int(side) for side in high - low + 1)
+            width, height = stated_size(file.header())
         _check_size(path.name, width, height)
         with OpenEXR.File(str(path), separate_channels=True) as file:
             channels = {name: channel.pixels for name, channel in file.channels().items()}

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fsid.assets.exr import stated_size
 from fsid.dataset.photos import (
     PHOTO_SUFFIXES,
     SMALLEST_PX,
@@ -29,6 +30,8 @@ EXR_SUFFIX = ".exr"
 _SRGB_CHROMATICITIES = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
 _NAMED = 5
 """So many unusable pictures are named."""
+_MOST_PX = 2**27
+"""Of a render; about as many as Pillow takes of a photograph."""
 _BEAUTY = "Combined"
 """Blender's name of the layer that holds all light."""
 
@@ -108,16 +111,21 @@ def read_exr(path: Path) -> np.ndarray:
     """(H, W, 3) float32 linear sRGB light >= 0, even size, of the channels R, G, B (or Y).
 
     Of several layers: the one without a name, else Blender's `Combined`, else the only one with colours.
-    Negative values, which renderers' filters leave, become 0. FsidError: unreadable, no such channels, other
-    primaries than those of sRGB, NaN or infinity.
+    Negative values, which renderers' filters leave, become 0. FsidError: unreadable, too large, no such
+    channels, other primaries than those of sRGB, NaN or infinity.
     """
     import OpenEXR
 
     try:
+        with OpenEXR.File(str(path), header_only=True) as file:  # before anything is decoded
+            sizes = [stated_size(part.header) for part in file.parts]
+        for width, height in sizes:
+            if width * height > _MOST_PX:
+                raise FsidError(f"{path}: is {width}x{height} pixels, more than {_MOST_PX >> 20} million")
         with OpenEXR.File(str(path), separate_channels=True) as file:
             parts = [{name: c.pixels for name, c in part.channels.items()} for part in file.parts]
             chromaticities = file.header().get("chromaticities", _SRGB_CHROMATICITIES)
-    except (RuntimeError, ValueError, OSError):
+    except (RuntimeError, ValueError, OSError, KeyError):
         raise FsidError(f"{path}: cannot be read as OpenEXR, it is truncated or something else") from None
     colours = _light_of(path, parts)
     if not np.allclose(chromaticities, _SRGB_CHROMATICITIES, atol=2e-3):
