@@ -46,7 +46,7 @@ def test_a_gap_is_paired_by_image():
     assert sorted(gaps(rows, "full-seed0", "x-seed0", "iso800", "s", "psnr_raw")) == [-0.5, 1.0]
 
 
-def test_synthetic_against_real_goes_on_where_it_was_stopped(photos: Path, tmp_path: Path):
+def test_synthetic_against_real_goes_on_where_it_was_stopped(photos: Path, tmp_path: Path, capsys):
     out = tmp_path / "experiment"
     held_back = tmp_path / "other"
     shutil.copytree(photos, held_back)
@@ -82,6 +82,13 @@ def test_synthetic_against_real_goes_on_where_it_was_stopped(photos: Path, tmp_p
     with pytest.raises(SystemExit) as stop:
         main([*command, "--count", "3"])
     assert stop.value.code == 2
+
+    next(held_back.iterdir()).unlink()
+    with pytest.raises(SystemExit) as stop:
+        main(command)
+    assert stop.value.code == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert f"{held_back}: holds other photographs than those that {out}/testsets/other was made of" in said
 
 
 def test_a_demo_is_gone_on_with_by_the_same_command_alone(tmp_path: Path, capsys):

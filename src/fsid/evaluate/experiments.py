@@ -28,6 +28,7 @@ from fsid.dataset import (
     find_pictures,
     generate,
 )
+from fsid.dataset.pictures import pictures_digest
 from fsid.denoise import TrainConfig, train, train_config
 from fsid.errors import FsidError
 from fsid.evaluate.claim import claimed
@@ -270,6 +271,12 @@ def _testsets(out: Path, config: ExperimentConfig, bar: ProgressBar) -> list[Pat
         if not (path / "testset.json").exists():
             with bar(f"test set {path.name}", "photographs") as progress:
                 photo_testset([Path(folder)], path, camera=config.camera, isos=TEST_ISOS, progress=progress)
+        digest = read_testset(path).pictures_digest
+        if digest and digest != pictures_digest(find_photos(folder)):
+            raise FsidError(
+                f"{folder}: holds other photographs than those that {path} was made of (names or sizes "
+                "differ); put those back, or use another folder"
+            )
     return found
 
 

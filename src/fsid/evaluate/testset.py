@@ -25,6 +25,7 @@ import numpy as np
 
 from fsid.config import from_plain, to_plain
 from fsid.dataset import find_photos, read_photo
+from fsid.dataset.pictures import pictures_digest
 from fsid.errors import FsidError
 from fsid.files import held, write_atomically
 from fsid.sensor import (
@@ -60,7 +61,11 @@ class TestImage:
 
 @dataclass(frozen=True)
 class TestSet:
-    """The content of testset.json. frames: noisy captures per image and level."""
+    """The content of testset.json. frames: noisy captures per image and level.
+
+    pictures_digest: of names and sizes of the photographs; "" where there are none, and unknown in what FSID
+    wrote before it was recorded.
+    """
 
     __test__ = False
 
@@ -70,6 +75,7 @@ class TestSet:
     seed: int
     notes: str
     frames: int = 1
+    pictures_digest: str = ""
 
     def __post_init__(self) -> None:
         if self.seed < 0:
@@ -156,6 +162,7 @@ def photo_testset(
         ),
         seed=seed,
         notes="photographs unprocessed to RAW (Brooks et al. 2019), noise from the camera's profile",
+        pictures_digest=pictures_digest([path for _, path in photos]),
     )
 
     def truth(rng: np.random.Generator, i: int) -> Raw:
