@@ -423,6 +423,24 @@ def test_a_test_set_fills_the_folder_that_is_there(photos: Path, tmp_path: Path,
     assert moved[-1] == "testset.json"
 
 
+def test_a_run_that_was_killed_while_its_set_appeared_leaves_no_content(photos: Path, tmp_path: Path):
+    """An image was in its place already, and testset.json, the last, was not."""
+    out, part = tmp_path / "out", tmp_path / "out" / ".testset.part"
+    photo_testset([photos], out, camera="pixel6", isos=[800])
+    part.mkdir()
+    for name in ("testset.json", "0001-coffee-1", "0002-coffee-2"):
+        (out / name).rename(part / name)
+    (out / "mine").touch()
+    before = sorted(out.rglob("*"))
+    with pytest.raises(FsidError, match="is not empty"):
+        photo_testset([photos], out, camera="pixel6", isos=[1600])
+    assert sorted(out.rglob("*")) == before
+    (out / "mine").unlink()
+    photo_testset([photos], out, camera="pixel6", isos=[1600])
+    assert read_testset(out).levels == ("iso1600",)
+    assert not list(out.rglob("iso800*"))
+
+
 def test_a_test_set_that_fails_leaves_a_folder_as_it_was(tmp_path: Path):
     for out in (tmp_path / "new", tmp_path / "there"):
         with pytest.raises(FsidError, match="/image/clean"), staged(out) as root:

@@ -244,10 +244,11 @@ def staged(out: Path) -> Iterator[Path]:
     root, is_new = out.resolve(), not out.exists()
     with held(root, "another fsid testset is filling it") as alone:
         part = root / ".testset.part"
-        if any(path != part for path in root.iterdir()):
+        left = _left_by_a_killed_run(part) if alone else [part]
+        if any(path not in left for path in root.iterdir()):
             raise FsidError(f"{out}: exists already and is not empty; use another folder")
-        if alone:
-            shutil.rmtree(part, ignore_errors=True)  # of a run that was killed
+        for path in left if alone else ():
+            shutil.rmtree(path, ignore_errors=True)
         _make(part)
         try:
             yield part
@@ -260,6 +261,16 @@ def staged(out: Path) -> Iterator[Path]:
             if is_new:
                 with suppress(OSError):  # it holds the test set
                     root.rmdir()
+
+
+def _left_by_a_killed_run(part: Path) -> list[Path]:
+    """What had been moved out of `part`, images of a set whose testset.json is still in it, and `part`."""
+    try:
+        images = json.loads((part / TESTSET_FILE).read_text(encoding="utf-8"))["images"]
+        names = [image["name"] for image in images]
+    except (OSError, ValueError):
+        names = []
+    return [*(part.parent / name for name in names), part]
 
 
 def _make(folder: Path) -> None:
