@@ -17,9 +17,10 @@ from fsid.cli.main import main
 from fsid.dataset import generate_config
 from fsid.dataset.attempt import Attempt
 from fsid.render.camera import lens_of
+from fsid.render.drawable import turn_about
 from fsid.render.gltf import LUMENS_PER_WATT, glb_bytes
 from fsid.render.gltf_textures import base_colour, boxed, normals
-from fsid.render.parts import Surface, parts_of, turn
+from fsid.render.parts import Surface, parts_of
 from fsid.scene import scene_from_json, scene_to_json
 from fsid.scene.model import Background, Camera, Light, Material, Object, Scene, Transform
 
@@ -195,8 +196,8 @@ def test_colours_are_the_palettes():
 
 
 def test_turns_are_about_their_axis():
-    np.testing.assert_allclose(turn(np.array((0.0, 0.0, 90.0))) @ (1, 0, 0), (0, 1, 0), atol=1e-12)
-    np.testing.assert_allclose(turn(np.zeros(3)), np.eye(3))
+    np.testing.assert_allclose(turn_about((0.0, 0.0, 90.0), 1.0) @ (1, 0, 0), (0, 1, 0), atol=1e-12)
+    np.testing.assert_allclose(turn_about((0.0, 0.0, 0.0), 1.0), np.eye(3))
 
 
 def test_the_command_writes_it_whole(tmp_path: Path, capsys: pytest.CaptureFixture[str]):

@@ -117,7 +117,7 @@ def view_of(scene: Scene, camera_index: int) -> View:
     ]
     floor = 0.0 if open_air else float(background.mesh.vertices[:, 2].min())
     return View(
-        drawables=(background, *_objects(scene), *panels),
+        drawables=(background, *object_drawables(scene), *panels),
         lights=scene.lights,
         ambient=scene.ambient,
         camera=scene.cameras[camera_index],
@@ -128,7 +128,8 @@ def view_of(scene: Scene, camera_index: int) -> View:
     )
 
 
-def _objects(scene: Scene) -> list[Drawable]:
+def object_drawables(scene: Scene) -> list[Drawable]:
+    """S, M and T as drawables, with their motion. Raises FsidError where these do not belong together."""
     if not len(scene.objects) == len(scene.materials) == len(scene.transforms):
         raise FsidError("scene: objects, materials and transforms must have the same length")
     if scene.motions and len(scene.motions) != len(scene.objects):

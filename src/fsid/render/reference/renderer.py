@@ -20,15 +20,17 @@ from fsid.assets import bake_material
 from fsid.errors import FsidError
 from fsid.render.camera import Lens, lens_of
 from fsid.render.colour_contrast import set_colour_contrast
+from fsid.render.drawable import turn_about
 from fsid.render.frame import Frame
 from fsid.render.fringes import inside, magnified, with_margin
-from fsid.render.parts import parts_of, turn
+from fsid.render.parts import parts_of
 from fsid.render.reference.bodies import Body, body_of, bsdf_of, pyramids
 from fsid.render.reference.dicing import View
 from fsid.render.reference.lights import emitters, surroundings
 from fsid.render.reference.variant import load_mitsuba
 from fsid.render.sharpness import set_sharpness
 from fsid.scene.model import Camera, Scene
+from fsid.scene.vectors import vec3
 
 _PASS = 16
 """Samples per pass: the compiled variant keeps all paths of a pass in memory."""
@@ -225,18 +227,13 @@ def _moves(camera: Camera) -> bool:
 
 def _later(camera: Camera, offset_s: float) -> Camera:
     """The camera `offset_s` seconds later."""
-    rotation = turn(np.array(camera.spin_deg_s) * offset_s)
+    rotation = turn_about(camera.spin_deg_s, offset_s)
     position = np.array(camera.position_m) + np.array(camera.velocity_m_s) * offset_s
     forward = rotation @ (np.array(camera.target_m) - camera.position_m)
     return replace(
         camera,
-        position_m=_vec3(position),
-        target_m=_vec3(position + forward),
-        up=_vec3(rotation @ np.array(camera.up)),
+        position_m=vec3(position),
+        target_m=vec3(position + forward),
+        up=vec3(rotation @ np.array(camera.up)),
         time_s=camera.time_s + offset_s,
     )
-
-
-def _vec3(values: np.ndarray) -> tuple[float, float, float]:
-    x, y, z = (float(v) for v in values)
-    return (x, y, z)
