@@ -24,13 +24,12 @@ from fsid.files import write_atomically
 from fsid.render import gltf_textures as textures
 from fsid.render.camera import NEAR_M, lens_of
 from fsid.render.parts import Part, parts_of
+from fsid.render.shadows import FULL_SHARE, half_axes
 from fsid.scene import scene_to_json
 from fsid.scene.check import check_scene
 from fsid.scene.model import Camera, Light, Material, Scene
 
 LUMENS_PER_WATT = 683.0
-_FULL_SHARE = 0.8
-"""Of a spot's half angle: within, it has its full strength."""
 
 _ARRAY, _INDEX = 34962, 34963
 _FLOAT, _UINT = 5126, 5125
@@ -108,7 +107,7 @@ class _Document:
         }
         if light.kind == "spot":
             half = min(np.radians(light.cone_deg / 2), np.pi / 2 - 1e-3)
-            entry["spot"] = {"innerConeAngle": _FULL_SHARE * half, "outerConeAngle": half}
+            entry["spot"] = {"innerConeAngle": FULL_SHARE * half, "outerConeAngle": half}
         self._extensions.add("KHR_lights_punctual")
         self._lights.append(entry)
         node = {
@@ -249,10 +248,8 @@ class _Document:
         return {"index": self._shared[key]}
 
     def _add_panel(self, number: int, light: Light, forward: np.ndarray) -> None:
-        right = np.cross(forward, (0.0, 0.0, 1.0))
-        right = np.array((1.0, 0.0, 0.0)) if np.linalg.norm(right) < 1e-6 else right / np.linalg.norm(right)
-        half = np.stack([right * light.size_m[0] / 2, np.cross(forward, right) * light.size_m[1] / 2])
-        corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) @ half
+        width, height = half_axes(light)
+        corners = np.array([(-1, 1), (1, 1), (1, -1), (-1, -1)]) @ np.stack([width, height])
         peak = max(*light.colour, 1e-9)
         material = {
             "name": f"light {number}",

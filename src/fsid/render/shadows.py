@@ -21,6 +21,9 @@ from fsid.scene.model import Light
 BORDER = 0.17
 """Width of a tile's border in tangent units; a large area light has a wider one."""
 
+FULL_SHARE = 0.8
+"""Of a spot's half angle: within, it has its full strength."""
+
 NEAR_M = 0.02
 COLUMNS = 6
 _LARGEST_PX = 16384
@@ -140,7 +143,8 @@ def _side_px(tiles: int, tile_px: int) -> int:
 
 
 def half_axes(light: Light) -> tuple[np.ndarray, np.ndarray]:
-    """Half width and half height of an area light as vectors in the world."""
+    """Half width and half height of an area light as vectors in the world; their cross product points away
+    from its light."""
     direction = unit(np.array(light.direction))
     width = np.cross(direction, (0.0, 0.0, 1.0))
     width = np.array([1.0, 0.0, 0.0]) if np.linalg.norm(width) < 1e-6 else unit(width)
@@ -210,7 +214,7 @@ def cone_cosines(light: Light) -> tuple[float, float]:
     if light.kind != "spot":
         return -2.0, -1.5
     half = np.radians(light.cone_deg) / 2
-    return float(np.cos(half)), float(np.cos(0.8 * half))
+    return float(np.cos(half)), float(np.cos(FULL_SHARE * half))
 
 
 _SIDES = [

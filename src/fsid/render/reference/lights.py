@@ -15,15 +15,13 @@ from typing import Any
 import numpy as np
 
 from fsid.errors import FsidError
+from fsid.render.shadows import FULL_SHARE, half_axes
 from fsid.render.sky import panorama
 from fsid.scene.model import Light, Scene
 
 CLOUD = 32
 _RIM = 256
 """Pixels of a spot's picture."""
-
-_FULL_SHARE = 0.8
-"""Of a spot's half angle: within, it has its full strength."""
 
 
 def emitters(mi: Any, light: Light, name: str) -> dict[str, Any]:
@@ -81,13 +79,9 @@ def _sun(light: Light, offset: np.ndarray, rgb: np.ndarray) -> dict[str, Any]:
 
 
 def _area(mi: Any, light: Light) -> dict[str, Any]:
-    forward = _unit(light.direction)
-    right = np.cross(forward, (0.0, 0.0, 1.0))
-    right = np.array((1.0, 0.0, 0.0)) if np.linalg.norm(right) < 1e-6 else _unit(right)
-    up = np.cross(forward, right)
-    width, height = light.size_m
+    width, height = half_axes(light)
     matrix = np.eye(4)
-    matrix[:3] = np.stack([right * width / 2, up * height / 2, forward, light.position_m], axis=-1)
+    matrix[:3] = np.stack([width, -height, _unit(light.direction), light.position_m], axis=-1)
     return {
         "type": "rectangle",
         "to_world": mi.ScalarTransform4f(matrix),
@@ -100,7 +94,7 @@ def _rim(half_deg: float) -> np.ndarray:
     """(P, P, 3) strength of a spot over its square field: smooth in the cosine from full to nothing."""
     at = ((np.arange(_RIM) + 0.5) / _RIM * 2 - 1) * np.tan(np.radians(half_deg))
     cosine = 1 / np.sqrt(1 + at[None, :] ** 2 + at[:, None] ** 2)
-    outer, inner = np.cos(np.radians([half_deg, _FULL_SHARE * half_deg]))
+    outer, inner = np.cos(np.radians([half_deg, FULL_SHARE * half_deg]))
     t = np.clip((cosine - outer) / (inner - outer), 0, 1)
     return np.repeat((t * t * (3 - 2 * t))[..., None], 3, axis=2).astype(np.float32)
 
