@@ -3,43 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import product
 
-import numpy as np
 from matplotlib.figure import Figure
 
 from fsid.evaluate.report import Picture, plot
 from fsid.sensor import CameraProfile
-
-SITE_COLOURS = {"R": "tab:red", "Gr": "tab:green", "Gb": "tab:olive", "B": "tab:blue"}
+from fsid.sensor.fit_plot import plot_levels
 
 
 def noise_profile_plot(profile: CameraProfile, isos: Sequence[float]) -> Picture:
-    """k and sigma2 against ISO: the published points, and the line that is used."""
-    figure = Figure(figsize=(8, 3.2))
+    """k and sigma2 against ISO, and where the ISOs of a test are."""
+    figure = Figure(figsize=(8, 3.2), layout="constrained")
     left, right = figure.subplots(1, 2)
-    grid = np.geomspace(min(*profile.iso, *isos), max(*profile.iso, *isos), 64)
-    levels = [profile.level(iso) for iso in grid]
-    published_k, published_sigma2 = np.asarray(profile.k), np.asarray(profile.sigma2)
-    for site, (name, colour) in enumerate(SITE_COLOURS.items()):
-        left.loglog(grid, [level.k[site] for level in levels], color=colour, label=name)
-        left.loglog(profile.iso, published_k[:, site], "o", color=colour, markersize=3)
-        right.loglog(grid, [level.sigma2[site] for level in levels], color=colour)
-        positive = published_sigma2[:, site] > 0
-        right.loglog(
-            np.asarray(profile.iso)[positive],
-            published_sigma2[positive, site],
-            "o",
-            color=colour,
-            markersize=3,
-        )
-    left.set(xlabel="ISO", ylabel="k (normalised)")
-    right.set(xlabel="ISO", ylabel="sigma2 (normalised)")
-    left.legend(fontsize=8)
-    for axis in (left, right):
-        axis.grid(alpha=0.3, which="both")
-        for iso in isos:
-            axis.axvline(iso, color="grey", linewidth=0.6, linestyle=":")
-    figure.tight_layout()
+    plot_levels(left, right, profile)
+    for axis, iso in product((left, right), isos):
+        axis.axvline(iso, color="grey", linewidth=0.6, linestyle=":")
     return plot(
         figure,
         f"{profile.camera}: lines as used, points as published (negative published sigma2 cannot be drawn), "
