@@ -17,6 +17,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
 import tifffile
 
 from fsid.config import from_plain, read_yaml
@@ -58,6 +59,10 @@ class StoredMosaic:
     scene: int = 0
     split: str = "train"
 
+    def levels(self) -> np.ndarray:
+        """Its DN: (height, width) uint16, mapped from the file."""
+        return np.memmap(self.shard, "<u2", mode="r", offset=self.offset, shape=(self.height, self.width))
+
 
 def index_mosaics(data_dir: str | Path, kind: MosaicKind = "clean") -> tuple[StoredMosaic, ...]:
     """All mosaics of one kind in `data_dir`/shard-*.tar, in the order of shards and samples.
@@ -95,9 +100,7 @@ def identity(data_dir: Path) -> str:
     if file.exists():
         return hashlib.sha256(file.read_bytes()).hexdigest()
     first = next(m for shard in find_shards(data_dir) for m in _index_shard(shard, ".clean.dng"))
-    with first.shard.open("rb") as pixels:
-        pixels.seek(first.offset)
-        return hashlib.sha256(pixels.read(2 * first.height * first.width)).hexdigest()
+    return hashlib.sha256(first.levels().tobytes()).hexdigest()
 
 
 def task_of(data_dir: Path) -> str:

@@ -13,7 +13,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -34,6 +34,10 @@ LEAST_PICTURES = 50
 PHOTO_CAMERA = "pixel6"
 
 Progress = Callable[[int, int], None]
+Measured = dict[str, np.ndarray]
+"""Statistics by name, of a picture or pooled."""
+Reader = tuple[Sequence, Callable[..., np.ndarray]]
+"""What is to be read, and the function that reads one of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +75,22 @@ def inspect(
     readers = [_reader(folder, limit) for folder in (data, reference, other) if folder is not None]
     if reference is not None and len(readers[1][0]) < 2:
         raise FsidError(f"{reference}: one picture has no spread to measure distances in; take more of them")
+    measured = _measured(readers, progress)
+    values = pool(measured[0])
+    if reference is None:
+        return Inspection(str(data), len(measured[0]), values)
+    rival = None if other is None else (str(other), measured[2])
+    comparisons, yardstick = _compared(values, (str(reference), measured[1]), rival)
+    real = pool(measured[1])
+    return Inspection(
+        str(data), len(measured[0]), values, real, str(reference), tuple(comparisons), yardstick
+    )
+
+
+def _measured(readers: Sequence[Reader], progress: Progress) -> list[list[Measured]]:
+    """The statistics of each picture of each set."""
     total = sum(len(items) for items, _ in readers)
-    measured: list[list[dict[str, np.ndarray]]] = []
+    measured: list[list[Measured]] = []
     done = 0
     for items, read in readers:
         measured.append([])
@@ -80,38 +98,34 @@ def inspect(
             measured[-1].append(measure(read(item)))
             done += 1
             progress(done, total)
-    values = pool(measured[0])
-    if reference is None:
-        return Inspection(str(data), len(measured[0]), values)
-    real = pool(measured[1])
-    count = len(measured[1])
+    return measured
+
+
+def _compared(
+    values: Measured, reference: tuple[str, list[Measured]], other: tuple[str, list[Measured]] | None
+) -> tuple[list[Comparison], str]:
+    """Distances of pooled `values` from a reference, and in words what they are relative to.
+
+    reference, other: name and pictures of a set.
+    """
+    name, pictures = reference
+    real, count = pool(pictures), len(pictures)
     if other is not None:
-        comparisons = compare(values, real, pool(measured[2]))
-        least = min(count, len(measured[2]))
-        yardstick = (
-            f"1x is how far {other} ({len(measured[2])} pictures) lies from the {count} of {reference}"
-        )
-        if least < LEAST_PICTURES:
+        other_name, others = other
+        yardstick = f"1x is how far {other_name} ({len(others)} pictures) lies from the {count} of {name}"
+        if min(count, len(others)) < LEAST_PICTURES:
             yardstick += f"; sets of fewer than {LEAST_PICTURES} differ by chance, so relative is too small"
-    elif count >= LEAST_PICTURES:
-        halves = compare(pool(measured[1][::2]), pool(measured[1][1::2]))
-        found = compare(values, real)
-        comparisons = [
-            Comparison(f.name, f.mean, f.reference_mean, f.distance, half.distance)
-            for f, half in zip(found, halves, strict=True)
-        ]
-        yardstick = (
-            f"1x is how far the halves of the {count} pictures of {reference} lie apart by chance, the less "
-            "the more they are; the aim of 2x is for --other, a second real set"
-        )
-    else:
-        comparisons = compare(values, real)
-        yardstick = (
+        return compare(values, real, pool(others)), yardstick
+    found = compare(values, real)
+    if count < LEAST_PICTURES:
+        return found, (
             f"none: halves of {count} pictures differ by chance too much, {LEAST_PICTURES} are the least; "
             "--other takes a second real set"
         )
-    return Inspection(
-        str(data), len(measured[0]), values, real, str(reference), tuple(comparisons), yardstick
+    halves = compare(pool(pictures[::2]), pool(pictures[1::2]))
+    return [replace(each, yardstick=half.distance) for each, half in zip(found, halves, strict=True)], (
+        f"1x is how far the halves of the {count} pictures of {name} lie apart by chance, the less "
+        "the more they are; the aim of 2x is for --other, a second real set"
     )
 
 
@@ -132,8 +146,7 @@ def _finite(record: dict) -> dict:
     return {key: None if value != value else value for key, value in record.items()}
 
 
-def _reader(folder: Path, limit: int) -> tuple[Sequence, Callable[..., np.ndarray]]:
-    """What is to be read of a folder, and the function that reads one of it."""
+def _reader(folder: Path, limit: int) -> Reader:
     if not folder.is_dir():
         raise FsidError(f"{folder}: is neither a dataset nor a folder of photographs")
     if any(folder.glob("shard-*.tar")):
@@ -148,10 +161,9 @@ def _spaced(items: Sequence, limit: int) -> list:
 
 def _stored_picture(stored: StoredMosaic) -> np.ndarray:
     balance, matrix = _colour(stored)
-    levels = np.memmap(
-        stored.shard, "<u2", mode="r", offset=stored.offset, shape=(stored.height, stored.width)
+    mosaic = (stored.levels().astype(np.float32) - stored.black_level) / (
+        stored.white_level - stored.black_level
     )
-    mosaic = (levels.astype(np.float32) - stored.black_level) / (stored.white_level - stored.black_level)
     return _picture(mosaic, stored.cfa, balance, matrix)
 
 

@@ -98,9 +98,7 @@ def validation(mosaics: Sequence[StoredMosaic], config: TrainConfig, device: tor
 
 
 def _read(mosaic: StoredMosaic) -> Raw:
-    shape = (mosaic.height, mosaic.width)
-    pixels = np.memmap(mosaic.shard, np.uint8, mode="r", offset=mosaic.offset, shape=2 * shape[0] * shape[1])
-    x = from_dn(pixels.view("<u2").reshape(shape), mosaic.black_level, mosaic.white_level)
+    x = from_dn(mosaic.levels(), mosaic.black_level, mosaic.white_level)
     return Raw(x, mosaic.cfa, mosaic.black_level, mosaic.white_level, (1.0, 1.0, 1.0), np.eye(3))
 
 
