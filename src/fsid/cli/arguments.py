@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
 from fsid.errors import FsidError
 
+if TYPE_CHECKING:
+    from fsid.config import Override
+
 Output = Annotated[Path, tyro.conf.arg(name="output", aliases=["-o"])]
 OptionalOutput = Annotated[Path | None, tyro.conf.arg(name="output", aliases=["-o"])]
+
+
+def overrides(single: Iterable[str], **options: Any) -> list[Override]:
+    """Settings of --set, and of the options of their name that were given, which win."""
+    return [*single, *((key, value) for key, value in options.items() if value is not None)]
 
 
 def black_levels(text: str | None) -> tuple[float, ...] | None:

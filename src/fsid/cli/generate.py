@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Literal
 from rich.console import Console
 from tyro.conf import Positional
 
+from fsid.cli.arguments import overrides
 from fsid.cli.iso_notes import note_extrapolation
 from fsid.cli.libraries import read_libraries
 from fsid.cli.progress import progress_bar
@@ -20,7 +21,6 @@ from fsid.counted import counted
 from fsid.errors import FsidError
 
 if TYPE_CHECKING:
-    from fsid.config import Override
     from fsid.dataset import DatasetConfig, GenerateConfig, Workforce
 
 Variant = Literal["objects", "materials", "objects-materials", "full"]
@@ -86,25 +86,25 @@ def generate(
     from fsid.config import given_keys
     from fsid.dataset import Workforce, check_given, dataset_config, generate_config, is_begun, make_only
 
-    given = {
-        "width": width,
-        "height": height,
-        "variant": variant,
-        "task": task,
-        "renderer": renderer,
-        "quality": quality,
-        "images": images and os.fspath(images),
-    }
-    overrides: list[Override] = [*set, *((key, value) for key, value in given.items() if value is not None)]
+    given = overrides(
+        set,
+        width=width,
+        height=height,
+        variant=variant,
+        task=task,
+        renderer=renderer,
+        quality=quality,
+        images=images and os.fspath(images),
+    )
     console = Console(stderr=True, quiet=quiet)
     if only and dry_run:
         raise FsidError("--dry-run: says what a dataset takes, not one sample; leave out --only")
-    if only.endswith(".json") and (config or overrides or (count, seed) != (None, None)):
+    if only.endswith(".json") and (config or given or (count, seed) != (None, None)):
         raise FsidError(f"--only {only}: the file says all of it; leave out --count, --seed and settings")
-    settings = generate_config(config, overrides)
-    check_given(settings, given_keys(overrides))
+    settings = generate_config(config, given)
+    check_given(settings, given_keys(given))
     if only:
-        stated = settings if config or overrides else None
+        stated = settings if config or given else None
         say = partial(console.print, soft_wrap=True, markup=False)
         for path in make_only(out, only, stated, seed, note=say):
             say(str(path))

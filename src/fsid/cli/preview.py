@@ -6,10 +6,10 @@ from pathlib import Path
 
 from tyro.conf import Positional
 
+from fsid.cli.arguments import overrides
 from fsid.cli.generate import Variant
 from fsid.cli.libraries import read_libraries
 from fsid.cli.progress import progress_bar
-from fsid.config import Override
 
 
 def preview(
@@ -50,8 +50,7 @@ def preview(
     )
 
     check_png(output)
-    options = {"width": width, "height": height, "variant": variant}
-    given: list[Override] = [*set, *((key, value) for key, value in options.items() if value is not None)]
+    given = overrides(set, width=width, height=height, variant=variant)
     settings = generate_config(config, [("width", 480), ("height", 270), *given])
     check_given(settings, given_keys(given), "preview")
     dataset_config(settings, seed)

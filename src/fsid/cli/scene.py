@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from tyro.conf import Positional
 
-from fsid.cli.arguments import Output
+from fsid.cli.arguments import Output, overrides
 from fsid.cli.generate import Variant
 from fsid.errors import FsidError
 from fsid.files import write_atomically
-
-if TYPE_CHECKING:
-    from fsid.config import Override
 
 
 def scene(
@@ -48,10 +44,9 @@ def scene(
     suffix = output.suffix.lower()
     if suffix not in (".json", ".glb"):
         raise FsidError(f"{output}: scenes are written as .json or .glb")
-    given = {"width": width, "height": height, "variant": variant}
-    overrides: list[Override] = [*set, *((key, value) for key, value in given.items() if value is not None)]
-    settings = generate_config(config, overrides)
-    check_given(settings, given_keys(overrides), "scene")
+    given = overrides(set, width=width, height=height, variant=variant)
+    settings = generate_config(config, given)
+    check_given(settings, given_keys(given), "scene")
     chosen = sample(
         scene_config(settings),
         seed,

@@ -14,7 +14,7 @@ from fsid.assets import Mesh, build_background, build_mesh
 from fsid.assets.solids import rotation_matrix
 from fsid.errors import FsidError
 from fsid.render.shadows import half_axes
-from fsid.scene.check import check_scene
+from fsid.scene.check import camera_of, check_scene
 from fsid.scene.model import (
     ZERO,
     Background,
@@ -103,8 +103,7 @@ class View:
 
 def view_of(scene: Scene, camera_index: int) -> View:
     """The background and the objects of a scene from one of its cameras. Raises FsidError."""
-    if not 0 <= camera_index < len(scene.cameras):
-        raise FsidError(f"camera_index {camera_index}: the scene has {len(scene.cameras)} cameras")
+    camera = camera_of(scene, camera_index)
     check_scene(scene)
     open_air = scene.background.kind == "open-air"
     background = background_drawable(scene.background)
@@ -120,7 +119,7 @@ def view_of(scene: Scene, camera_index: int) -> View:
         drawables=(background, *object_drawables(scene), *panels),
         lights=scene.lights,
         ambient=scene.ambient,
-        camera=scene.cameras[camera_index],
+        camera=camera,
         room_size_m=scene.background.size_m,
         room_materials=() if open_air else _sides(scene.background),
         room_floor_m=floor,

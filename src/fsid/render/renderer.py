@@ -52,6 +52,7 @@ from fsid.render.sharpness import set_sharpness
 from fsid.render.stage import Stage, stage_of
 from fsid.render.targets import Targets
 from fsid.render.texels import Bake, Texels, bake_texels
+from fsid.scene.check import camera_of
 from fsid.scene.model import ZERO, Camera, Scene
 
 Mark = Callable[[str], None]
@@ -164,9 +165,7 @@ class Renderer:
         frame = self.draw(view)
         if flow_to is None:
             return frame
-        if not 0 <= flow_to < len(scene.cameras):
-            raise FsidError(f"flow_to {flow_to}: the scene has {len(scene.cameras)} cameras")
-        here, there = view.camera, scene.cameras[flow_to]
+        here, there = view.camera, camera_of(scene, flow_to, "flow_to")
         flow = flow_between(
             frame,
             view.drawables,

@@ -35,6 +35,13 @@ def check_scene(scene: Scene) -> None:
         _check_material(where, material)
 
 
+def camera_of(scene: Scene, index: int, argument: str = "camera_index") -> Camera:
+    """One of the cameras of a scene; FsidError, naming `argument`, where it has no such."""
+    if not 0 <= index < len(scene.cameras):
+        raise FsidError(f"{argument} {index}: the scene has {len(scene.cameras)} cameras")
+    return scene.cameras[index]
+
+
 def _check_camera(where: str, camera: Camera) -> None:
     if min(camera.width, camera.height) < 1:
         raise FsidError(f"{where}: {camera.width}x{camera.height} pixels; at least 1x1 are needed")

@@ -29,6 +29,7 @@ from fsid.render.reference.dicing import View
 from fsid.render.reference.lights import emitters, surroundings
 from fsid.render.reference.variant import load_mitsuba
 from fsid.render.sharpness import set_sharpness
+from fsid.scene.check import camera_of
 from fsid.scene.model import Camera, Scene
 from fsid.scene.vectors import vec3
 
@@ -73,9 +74,7 @@ class ReferenceRenderer:
 
     def render(self, scene: Scene, camera_index: int = 0, *, seed: int = 0) -> Frame:
         """The frame of one of the scene's cameras; `seed` changes the noise only. Raises FsidError."""
-        if not 0 <= camera_index < len(scene.cameras):
-            raise FsidError(f"camera_index {camera_index}: the scene has {len(scene.cameras)} cameras")
-        asked = scene.cameras[camera_index]
+        asked = camera_of(scene, camera_index)
         if asked.distortion is not None:
             raise FsidError(
                 "the reference renderer has no lens distortion; draw scenes without: "
