@@ -11,11 +11,18 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from fsid.assets import bake_material, material_colours, material_tile_m, survey_textures, texture_sources
+from fsid.assets import (
+    bake_material,
+    material_colours,
+    material_tile_m,
+    survey_textures,
+    texture_sources,
+    textures,
+)
 from fsid.assets import texture_files as files
 from fsid.assets.patterns import noise
 from fsid.assets.survey import KNOWN
-from fsid.assets.textures import TILE_M, integrated, slopes_of
+from fsid.assets.textures import TILE_M, integrated, slopes_of, texture_key
 from fsid.assets.triangle import decode, enclosing, encode, hex_colours, srgb_to_linear
 from fsid.errors import FsidError
 
@@ -350,6 +357,22 @@ def test_bad_names_raise_one_line(tmp_path, name):
 def test_a_folder_without_textures_says_so(tmp_path):
     with pytest.raises(FsidError, match="no usable texture set"):
         texture_sources(tmp_path)
+
+
+def test_files_are_read_for_the_first_scene_that_has_them_alone(folder, monkeypatch):
+    """A scene asks for the colours and the texels of dozens of sets; a set of 2K pictures has 10 MB."""
+    name = texture_sources(folder)[0]
+    colours, key = material_colours(name, 0), texture_key(name)
+    monkeypatch.setattr(textures, "read_bounded", None)
+    assert (material_colours(name, 0), texture_key(name)) == (colours, key)
+
+
+def test_a_file_that_changes_while_it_is_read_is_not_kept_as_the_one_before(folder, monkeypatch):
+    name = texture_sources(folder)[0]
+    texture_key(name)
+    monkeypatch.setattr(textures, "read_bounded", lambda file: file.read_bytes() + b"more")
+    with pytest.raises(FsidError, match="changed while it was read"):
+        bake_material(name, 0, 2 * SIZE)
 
 
 def test_a_changed_file_is_another_material(folder):

@@ -104,22 +104,44 @@ def _set_of(name: str) -> TextureSet:
 def texture_key(name: str) -> str:
     """Key of what "file:PATH" gives, by the content of its files. Raises FsidError."""
     try:
-        return _key(_read(_set_of(name)))
+        return _key(_set_of(name))
     except RefusedImageError as error:
         raise FsidError(f"{name.removeprefix(PREFIX)}: {error}") from None
 
 
-def _read(found: TextureSet) -> dict[str, bytes]:
-    return {role: read_bounded(file) for role, file in sorted(found.files.items())}
+def _key(found: TextureSet) -> str:
+    return _key_as_of(tuple((role, file, *_state(file)) for role, file in sorted(found.files.items())))
 
 
-def _key(data: dict[str, bytes]) -> str:
+def _state(file: Path) -> tuple[int, int]:
+    """Size and time of a file; nothing of one that cannot be read, which reading it tells."""
+    try:
+        state = file.stat()
+    except OSError:
+        return -1, -1
+    return state.st_size, state.st_mtime_ns
+
+
+@lru_cache(maxsize=4096)
+def _key_as_of(files: tuple[tuple[str, Path, int, int], ...]) -> str:
+    """Every scene asks for the keys of its sets: files are read again only where they have changed."""
+    return _key_of({role: read_bounded(file) for role, file, _, _ in files})
+
+
+def _key_of(data: dict[str, bytes]) -> str:
     return content_key([code_key(_CODE).encode(), " ".join(data).encode(), *data.values()])
 
 
 def _bake(found: TextureSet, size: int) -> MaterialMaps:
-    data = _read(found)
-    return cached("file", _key(data), size, lambda: _maps(found, data, size))
+    key = _key(found)
+
+    def maps() -> MaterialMaps:
+        data = {role: read_bounded(file) for role, file in sorted(found.files.items())}
+        if _key_of(data) != key:
+            raise RefusedImageError("changed while it was read")
+        return _maps(found, data, size)
+
+    return cached("file", key, size, maps)
 
 
 def _maps(found: TextureSet, data: dict[str, bytes], size: int) -> MaterialMaps:
