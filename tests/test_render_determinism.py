@@ -5,19 +5,22 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import os
+import pickle
 import subprocess
 import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from ctypes import c_int, c_uint, c_void_p
 from dataclasses import replace
+from multiprocessing import Pipe, get_context
+from multiprocessing.connection import Connection
 
 import numpy as np
 import pytest
 
 from fsid.assets import MATERIAL_VARIANTS, MaterialMaps, material_families
 from fsid.errors import FsidError
-from fsid.render import Frame, GlInfo, Renderer, gpu_device, texels
+from fsid.render import Frame, GlInfo, Renderer, egl_devices, gpu_device, texels
 from fsid.render.context import gl
 from fsid.render.layers import MOST_LAYERS, LayerStore, fitting_size
 from fsid.render.texels import bake_texels, level_ranges
@@ -280,6 +283,31 @@ def test_a_second_renderer_is_refused(renderer: Renderer) -> None:
 def test_another_thread_is_told_why_it_cannot_render(renderer: Renderer) -> None:
     with ThreadPoolExecutor(1) as threads, pytest.raises(FsidError, match="thread that opened it"):
         threads.submit(renderer.render, sample(SceneConfig(), 7, width=32, height=32)).result()
+
+
+def _refusals(renderer: Renderer, found: Connection) -> None:
+    """What a forked process is told."""
+    for use in (lambda: renderer.radiance(scene(1)), Renderer, egl_devices):
+        try:
+            use()
+        except FsidError as error:
+            found.send(str(error))
+
+
+def test_a_forked_process_is_refused_where_the_driver_would_wait_for_ever(renderer: Renderer) -> None:
+    here, there = Pipe()
+    forked = get_context("fork").Process(target=_refusals, args=(renderer, there))
+    forked.start()
+    forked.join(60)
+    forked.kill()
+    said = [here.recv() for _ in range(3) if here.poll()]
+    assert len(said) == 3
+    assert all("spawn" in line for line in said)
+
+
+def test_a_renderer_is_not_sent_to_another_process(renderer: Renderer) -> None:
+    with pytest.raises(TypeError, match="open one there"):
+        pickle.dumps(renderer)
 
 
 def test_a_closed_renderer_says_so(renderer: Renderer) -> None:

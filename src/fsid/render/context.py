@@ -20,6 +20,11 @@ import moderngl
 from fsid.errors import FsidError
 
 REQUIRED_VERSION = 430
+FORKED = (
+    "this process was forked from one that had used OpenGL, whose driver waits for threads that a fork does "
+    "not copy: start workers afresh (multiprocessing_context='spawn' of PyTorch's DataLoader), or use OpenGL "
+    "in them alone"
+)
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3
 _LARGE_BYTES, _KEPT_BYTES = 2**20, 2**26
 _MOST_BYTES, _ALL_BYTES = 2**25, 2**30  # glibc's largest threshold for large blocks; more than is ever free
@@ -68,6 +73,7 @@ def open_context(device_index: int | None) -> moderngl.Context:
 
 def egl_devices() -> dict[int, GlInfo]:
     """EGL device index -> what it is, of all that give OpenGL 4.3. Not while a Renderer is open."""
+    check_not_forked()
     found: dict[int, GlInfo] = {}
     for index in range(_MAX_DEVICES):
         try:
@@ -90,6 +96,15 @@ def gpu_device(number: int) -> int:
             f"--workers-per-gpu: GPU {number} is needed, and OpenGL finds {len(gpus)} (fsid doctor)"
         )
     return gpus[number]
+
+
+_used_in: int | None = None  # the process that was the first to use OpenGL
+
+
+def check_not_forked() -> None:
+    """FsidError in a child, by fork, of a process that has used OpenGL: the driver would wait for ever."""
+    if _used_in not in (None, os.getpid()):
+        raise FsidError(FORKED)
 
 
 def gl_info(context: moderngl.Context) -> GlInfo:
@@ -141,6 +156,7 @@ def return_free_blocks() -> None:
 
 
 def _create(device_index: int) -> moderngl.Context:
+    global _used_in
     settings: Any = {"backend": "egl", "libgl": "libGL.so.1", "libegl": "libEGL.so.1"}
     settings["device_index"] = device_index
     # llvmpipe filters textures of 8 bits in 8 bits, in steps as large as read noise, unless it is told not
@@ -151,6 +167,8 @@ def _create(device_index: int) -> moderngl.Context:
     os.environ.setdefault("__GL_YIELD", "USLEEP")
     os.environ.setdefault("__GL_THREADED_OPTIMIZATIONS", "0")
     try:
-        return moderngl.create_context(require=REQUIRED_VERSION, standalone=True, **settings)
+        context = moderngl.create_context(require=REQUIRED_VERSION, standalone=True, **settings)
     except Exception as error:  # the EGL backend raises bare Exception
         raise FsidError(f"no OpenGL 4.3 on EGL device {device_index} ({error}): {_HELP}") from None
+    _used_in = os.getpid()
+    return context

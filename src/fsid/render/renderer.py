@@ -15,7 +15,7 @@ import threading
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from types import TracebackType
-from typing import ClassVar, Self
+from typing import ClassVar, NoReturn, Self
 
 import moderngl
 import numpy as np
@@ -26,6 +26,7 @@ from fsid.render.camera import lens_of
 from fsid.render.colour_contrast import set_colour_contrast
 from fsid.render.context import (
     GlInfo,
+    check_not_forked,
     gl_info,
     keep_blocks,
     open_context,
@@ -70,7 +71,8 @@ class Renderer:
     blurred by its depth for the part of the lens that it stands for. compute: shade in compute shaders
     instead of fragment shaders; None does so on a GPU. Both make the same image to rounding.
     Raises FsidError where OpenGL 4.3 is missing or a second Renderer is opened in one process. The thread
-    that opens it is the one that renders: OpenGL knows a context in one thread only.
+    that opens it is the one that renders: OpenGL knows a context in one thread only. Other processes open
+    their own; one that was forked from a process that had a Renderer cannot (a spawned one can): FsidError.
     """
 
     _active: ClassVar[Renderer | None] = None
@@ -85,6 +87,7 @@ class Renderer:
         lens_images: int = 1,
         compute: bool | None = None,
     ) -> None:
+        check_not_forked()
         if Renderer._active is not None:
             raise FsidError(
                 "a Renderer is already open in this process: close it first, or use another process"
@@ -146,6 +149,9 @@ class Renderer:
             self._context.release()
             Renderer._active = None
 
+    def __reduce__(self) -> NoReturn:
+        raise TypeError("a Renderer cannot be copied or sent to another process: open one there")
+
     def __enter__(self) -> Self:
         return self
 
@@ -196,6 +202,7 @@ class Renderer:
         """
         if Renderer._active is not self:
             raise FsidError("this Renderer is closed")
+        check_not_forked()
         if threading.get_ident() != self._thread:
             raise FsidError("a Renderer works in the thread that opened it; open and use it in one thread")
         asked = view.camera
