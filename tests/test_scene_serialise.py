@@ -9,8 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fsid.errors import FsidError
+from fsid.render.drawable import view_of
 from fsid.render.gltf import glb_bytes
-from fsid.scene import VARIANTS, SceneConfig, sample, scene_from_json, scene_to_json
+from fsid.scene import VARIANTS, Scene, SceneConfig, sample, scene_from_json, scene_to_json
 
 FEW = SceneConfig(objects=(2, 4))
 
@@ -114,3 +115,63 @@ def test_no_file_is_made_of_such_a_scene():
     flat = replace(scene, transforms=(replace(scene.transforms[0], scale=(1.0, 0.0, 1.0)),))
     with pytest.raises(FsidError, match=r"transforms\[0\]\.scale"):
         glb_bytes(flat)
+
+
+def _with(scene: Scene, key: str, value: object) -> Scene:
+    """The scene with one value of its first light, transform or material, or of its own, set by hand."""
+    group, _, name = key.partition(".")
+    if not name:
+        return replace(scene, **{group: value})
+    if group == "materials":
+        (first, *parts), *others = scene.materials
+        return replace(scene, materials=((replace(first, **{name: value}), *parts), *others))
+    first, *others = getattr(scene, group)
+    return replace(scene, **{group: (replace(first, **{name: value}), *others)})
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("lights.position_m", (np.nan, 0.0, 2.0)),
+        ("lights.position_m", (0.0, 2.0)),
+        ("lights.colour", (np.inf, 1.0, 1.0)),
+        ("lights.colour", 5.0),
+        ("transforms.position_m", (0.0, np.nan, 0.0)),
+        ("transforms.scale", 1.0),
+        ("materials.emission", np.inf),
+        ("materials.colours", ((0.5, 0.5, 0.5),) * 2),
+        ("materials.colours", ((0.5, np.nan, 0.5),) * 3),
+        ("cameras.target_m", (np.inf, 0.0, 0.0)),
+        ("cameras.width", 64.0),
+        ("ambient", (np.nan,) * 3),
+    ],
+)
+def test_what_a_hand_sets_wrong_is_named(key, value):
+    """Infinite and missing numbers would draw a picture, of NaN or without the object."""
+    scene = _with(sample(FEW, 7, width=64, height=48), key, value)
+    with pytest.raises(FsidError, match=rf"scene\.{key.replace('.', r'.*')}"):
+        view_of(scene, 0)
+    with pytest.raises(FsidError, match=rf"scene\.{key.replace('.', r'.*')}"):
+        scene_to_json(scene)
+
+
+def test_a_material_of_no_part_of_the_background_is_named():
+    scene = sample(FEW, 7, width=64, height=48)
+    surfaces = scene.background.materials
+    more = replace(scene.background, materials={**surfaces, "wall": next(iter(surfaces.values()))})
+    with pytest.raises(FsidError, match="'wall' is no part of"):
+        view_of(replace(scene, background=more), 0)
+
+
+def test_arrays_and_numbers_of_numpy_are_those_of_python():
+    scene = sample(FEW, 7, width=64, height=48)
+    place = np.asarray(scene.lights[0].position_m, np.float32)
+    ours = _with(_with(scene, "lights.position_m", place), "cameras.width", np.int64(64))
+    plain = _with(scene, "lights.position_m", tuple(place.tolist()))
+    assert scene_from_json(scene_to_json(ours)) == plain
+    assert isinstance(view_of(ours, 0).camera.width, int)  # moderngl takes no other
+
+
+def test_what_is_no_scene_is_named():
+    with pytest.raises(FsidError, match="a str is no Scene"):
+        view_of("scene.json", 0)

@@ -85,15 +85,15 @@ for _kind, _hook in ((int, _strict_int), (float, _strict_float), (bool, _strict_
 
 
 def to_plain(settings: Any) -> Any:
-    """Dataclasses and tuples as dicts and lists, NumPy's numbers and paths as what YAML and JSON hold."""
+    """Dataclasses and tuples as dicts and lists, what NumPy holds and paths as what YAML and JSON hold."""
     if dataclasses.is_dataclass(settings):
         return {field.name: to_plain(getattr(settings, field.name)) for field in dataclasses.fields(settings)}
     if isinstance(settings, Mapping):
         return {key: to_plain(item) for key, item in settings.items()}
     if isinstance(settings, tuple | list):
         return [to_plain(item) for item in settings]
-    if isinstance(settings, np.generic):
-        return settings.item()
+    if isinstance(settings, np.generic | np.ndarray):
+        return settings.tolist()
     return str(settings) if isinstance(settings, Path) else settings
 
 

@@ -103,8 +103,8 @@ class View:
 
 def view_of(scene: Scene, camera_index: int) -> View:
     """The background and the objects of a scene from one of its cameras. Raises FsidError."""
-    camera = camera_of(scene, camera_index)
     check_scene(scene)
+    camera = camera_of(scene, camera_index)
     open_air = scene.background.kind == "open-air"
     background = background_drawable(scene.background)
     if scene.sky is not None and not open_air:
@@ -119,7 +119,7 @@ def view_of(scene: Scene, camera_index: int) -> View:
         drawables=(background, *object_drawables(scene), *panels),
         lights=scene.lights,
         ambient=scene.ambient,
-        camera=camera,
+        camera=replace(camera, width=int(camera.width), height=int(camera.height)),  # OpenGL takes no NumPy's
         room_size_m=scene.background.size_m,
         room_materials=() if open_air else _sides(scene.background),
         room_floor_m=floor,
@@ -149,12 +149,18 @@ def object_drawables(scene: Scene) -> list[Drawable]:
 
 
 def background_drawable(background: Background) -> Drawable:
-    """B as a drawable. Raises FsidError for a kind that does not exist or a part without material."""
+    """B as a drawable. FsidError for a kind that does not exist, a part without material, or one too many."""
     mesh = build_background(background.kind, background.size_m)
     for name in mesh.part_names:
         if name not in background.materials:
             raise FsidError(
                 f"scene.background.materials: '{name}' is missing; give all of {', '.join(mesh.part_names)}"
+            )
+    for name in background.materials:
+        if name not in mesh.part_names:
+            raise FsidError(
+                f"scene.background.materials: '{name}' is no part of '{background.kind}'; "
+                f"those are {', '.join(mesh.part_names)}"
             )
     materials = tuple(background.materials[name] for name in mesh.part_names)
     return Drawable(mesh, STILL, materials, BACKGROUND_ID)

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import asdict, fields, is_dataclass
+from dataclasses import fields, is_dataclass
 from types import GenericAlias, NoneType, UnionType
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
 from fsid.assets import BACKGROUND_PARTS
+from fsid.config import to_plain
 from fsid.errors import FsidError
 from fsid.scene.check import check_scene
 from fsid.scene.lens import check_distortion, corner_radius
@@ -20,8 +21,12 @@ from fsid.scene.model import Scene
 
 
 def scene_to_json(scene: Scene) -> str:
-    """The scene as JSON text with sorted keys; the same scene always gives the same text."""
-    return json.dumps(asdict(scene), sort_keys=True, allow_nan=False)
+    """The scene as JSON text with sorted keys; the same scene always gives the same text.
+
+    NumPy's numbers and arrays are written as numbers and lists. Raises FsidError as `check_scene`.
+    """
+    check_scene(scene)
+    return json.dumps(to_plain(scene), sort_keys=True, allow_nan=False)
 
 
 def scene_from_json(text: str) -> Scene:
