@@ -144,3 +144,10 @@ def test_a_halved_mosaic_keeps_the_light(rng: np.random.Generator) -> None:
 def test_only_whole_pairs_of_tiles_are_halved(shape: tuple[int, int]) -> None:
     with pytest.raises(FsidError, match="multiples of 4"):
         halved(np.zeros(shape))
+
+
+@pytest.mark.parametrize("shape", [(8, 8), (8, 8, 1), (8, 8, 4), (4, 8, 8)])
+def test_a_picture_of_other_channels_is_refused(shape):
+    """Of four the first three would be taken; (4, H, W) is as good a picture of 4 x H pixels."""
+    with pytest.raises(FsidError, match="height, width, 3"):
+        mosaic(np.ones(shape, np.float32), "RGGB")

@@ -200,6 +200,31 @@ def test_a_photo_out_of_range_or_shape_is_refused(photo):
         unprocess(photo, np.eye(3), (2.0, 1.0, 1.5))
 
 
+@pytest.mark.parametrize(
+    "convert",
+    [
+        srgb_encode,
+        srgb_decode,
+        tone_curve,
+        lambda picture: linear_to_camera(picture, np.eye(3), (2.0, 1.0, 1.6)),
+        lambda picture: unprocess(picture, np.eye(3), (2.0, 1.0, 1.6)),
+        lambda picture: expose(np.random.default_rng(0), picture),
+    ],
+)
+def test_whole_numbers_do_not_pass_for_white(convert):
+    """Clipped to 0..1 nearly all of an 8-bit picture is 1."""
+    picture = np.arange(48, dtype=np.uint8).reshape(4, 4, 3)
+    for whole in (picture, picture.astype(np.uint16), picture % 2):
+        with pytest.raises(FsidError, match=r"floating-point|0\.\.1"):
+            convert(whole)
+
+
+@pytest.mark.parametrize("shape", [(8, 8), (8, 8, 4), (3, 8, 8)])
+def test_radiance_of_another_shape_is_refused(shape):
+    with pytest.raises(FsidError, match="height, width, 3"):
+        exposure_rand(np.random.default_rng(0), np.ones(shape, np.float32))
+
+
 def test_white_balance_of_a_frame_does_not_depend_on_its_size():
     """Sums over millions of pixels keep their digits."""
     picture = np.random.default_rng(3).uniform(0.05, 1.0, (30, 40, 3)).astype(np.float32)

@@ -13,6 +13,16 @@ from typing import Any
 
 import numpy as np
 
+from fsid.errors import FsidError
+
+
+def check_floating(x: Any, what: str) -> None:
+    """FsidError, naming `what`, for an array or tensor of whole numbers: nothing tells what is white."""
+    if x.dtype.kind != "f" if isinstance(x, np.ndarray) else not x.is_floating_point():
+        raise FsidError(
+            f"{what} must be floating-point, with 1 for white; got {x.dtype}: divide by the white"
+        )
+
 
 def namespace(x: Any) -> Any:
     """The module whose functions take `x`: numpy or torch."""

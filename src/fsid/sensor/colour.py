@@ -16,7 +16,7 @@ import numpy as np
 import yaml
 
 from fsid.errors import FsidError
-from fsid.sensor.arrays import like
+from fsid.sensor.arrays import check_floating, like
 
 # IEC 61966-2-1, linear sRGB -> XYZ, D65, the rounding that Brooks et al. use.
 SRGB_TO_XYZ = np.array(
@@ -75,6 +75,7 @@ def colour_rand(
 
 
 def apply_matrix(matrix: np.ndarray, rgb: Any) -> Any:
-    """matrix (3, 3) times every pixel of rgb (..., 3), an array or a tensor, in float32."""
+    """matrix (3, 3) times every pixel of rgb (..., 3), array or tensor, in float32. FsidError: integers."""
+    check_floating(rgb, "colour")
     rgb = rgb.astype(np.float32, copy=False) if isinstance(rgb, np.ndarray) else rgb.float()
     return rgb @ like(matrix.T, rgb)

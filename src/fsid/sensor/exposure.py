@@ -20,6 +20,7 @@ import numpy as np
 
 from fsid.errors import FsidError
 from fsid.sensor.colour import SRGB_TO_XYZ
+from fsid.sensor.unprocess import check_light
 
 KEY_RANGE = (0.07, 0.36)
 CLIPPED_PERCENT_RANGE = (0.005, 25.0)
@@ -33,7 +34,11 @@ _LUMINANCE = SRGB_TO_XYZ[1].astype(np.float32)
 
 
 def exposure_rand(rng: np.random.Generator, radiance: np.ndarray) -> np.ndarray:
-    """Draw the factors (3,) that take linear sRGB `radiance` (H, W, 3) >= 0 to units of sensor saturation."""
+    """Draw the factors (3,) that take linear sRGB `radiance` (H, W, 3) >= 0 to units of sensor saturation.
+
+    FsidError for another shape, for integers (a photograph is not linear) and for NaN or infinity.
+    """
+    check_light(radiance)
     if not np.all(np.isfinite(radiance)):
         raise FsidError("the frame holds NaN or infinite radiance; check its lights and materials")
     light = radiance.astype(np.float32, copy=False)

@@ -46,6 +46,8 @@ def shift_cfa(cfa: str, rows: int, columns: int) -> str:
 def mosaic(rgb: Any, cfa: str) -> Any:
     """Keep of each pixel of `rgb` (H, W, 3), H and W even, the one channel its filter passes: (H, W)."""
     check_even(rgb.shape[:2])
+    if rgb.shape[2:] != (3,):
+        raise FsidError(f"a picture must have shape (height, width, 3), RGB; got {tuple(rgb.shape)}")
     out = namespace(rgb).empty_like(rgb[..., 0])
     for (r, c), channel in zip(site_offsets(cfa), SITE_CHANNEL, strict=True):
         out[r::2, c::2] = rgb[r::2, c::2, channel]

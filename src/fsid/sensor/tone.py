@@ -1,4 +1,4 @@
-"""Display curves and their inverses, on 0..1, of numbers, NumPy arrays and tensors.
+"""Display curves and their inverses, on 0..1, of numbers, NumPy arrays and tensors; FsidError for integers.
 
     sRGB (IEC 61966-2-1):  e(v) = 12.92 v  up to v = 0.0031308,  else  1.055 v^(1/2.4) - 0.055
     tone curve (Brooks et al. 2019, eq. 1):  s(v) = 3 v^2 - 2 v^3,   s^-1(y) = 1/2 - sin(asin(1 - 2 y) / 3)
@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from fsid.sensor.arrays import lookup, namespace
+from fsid.sensor.arrays import check_floating, lookup, namespace
 
 _BLOCK = 1 << 16
 _ENTRIES = 1 << 16  # i / 65535: every value of an 8-bit or 16-bit photo, exactly
@@ -68,6 +68,8 @@ def _photo_table() -> np.ndarray:
 
 
 def _unit(image: Any) -> Any:
+    if not isinstance(image, np.generic | float | int):
+        check_floating(image, "a picture")
     if isinstance(image, np.ndarray | np.generic | float | int):
         return np.clip(image, 0, 1, dtype=np.float32)
     return image.float().clip(0, 1)

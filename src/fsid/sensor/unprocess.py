@@ -88,6 +88,13 @@ def check_srgb(srgb: Any) -> None:
 
 def check_linear(linear: Any) -> None:
     """FsidError unless `linear` is (H, W, 3) with finite floating-point values."""
+    check_light(linear)
+    if not (linear.min() > -math.inf and linear.max() < math.inf):
+        raise FsidError("linear light must hold finite values; it has NaN or infinity")
+
+
+def check_light(linear: Any) -> None:
+    """FsidError unless `linear` is (H, W, 3) with floating-point values."""
     if linear.ndim != 3 or linear.shape[2] != 3:
         raise FsidError(f"linear light must have shape (height, width, 3), RGB; got {linear.shape}")
     if isinstance(linear, np.ndarray) and linear.dtype.kind != "f":
@@ -95,5 +102,3 @@ def check_linear(linear: Any) -> None:
             f"linear light must be floating-point, 1 = saturation; got {linear.dtype}. Photographs are not "
             "linear: clean_from_photo takes them"
         )
-    if not (linear.min() > -math.inf and linear.max() < math.inf):
-        raise FsidError("linear light must hold finite values; it has NaN or infinity")
