@@ -217,3 +217,13 @@ def test_levels_that_no_camera_has_are_refused():
     )
     with pytest.raises(FsidError, match="upside down"):
         to_dn(raw)
+
+
+def test_noise_in_dn_is_told_from_normalised_noise():
+    """Lines of `fit_noise` are in DN; injected as they are, they would drown the image."""
+    level = NoiseLevel(k=(4.4,) * 4, sigma2=(0.6,) * 4)
+    clean = Raw(np.full((16, 16), 0.5, np.float32), "RGGB", 64, 1023, (2.0, 1.0, 1.6), np.eye(3))
+    with pytest.raises(FsidError, match="divide k in DN by white - black"):
+        noisy_from_clean(np.random.default_rng(0), clean, 800, level)
+    with pytest.raises(FsidError, match="clean signal must be floating-point"):
+        variance(np.full((16, 16), 500, np.uint16), NoiseLevel((0.01,) * 4, (1e-5,) * 4), "RGGB")

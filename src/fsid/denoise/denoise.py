@@ -127,8 +127,9 @@ def _check(raw: Raw, level: NoiseLevel | None, strength: float, tile_px: int) ->
         raise FsidError(
             "the noise level of this RAW is unknown: give a profile and an ISO (--profile, --iso)"
         )
+    if not isinstance(level, NoiseLevel):
+        raise FsidError(f"a {type(level).__name__} is no NoiseLevel; that of a profile is profile.level(iso)")
     check_strength(level, strength)
-    level.check()
     if not np.all(np.isfinite(raw.mosaic)):
         raise FsidError("this RAW holds NaN or infinity; read it again from its file")
     if tile_px < 1:
@@ -137,10 +138,8 @@ def _check(raw: Raw, level: NoiseLevel | None, strength: float, tile_px: int) ->
 
 def check_strength(level: NoiseLevel | None, strength: float) -> None:
     """FsidError where a noise level that is known is not physical, or the strength is none."""
-    if level is not None and not all(0 <= variance <= 1 for variance in (*level.k, *level.sigma2)):
-        raise FsidError(
-            f"noise level {level}: k and sigma2 are variances in units of the white level; 0 to 1 is possible"
-        )
+    if level is not None:
+        level.check()
     if not 0 <= strength <= MAX_STRENGTH:
         raise FsidError(
             f"strength {strength}: must be 0 (nothing is removed) to {MAX_STRENGTH:g}; 1 removes the noise"

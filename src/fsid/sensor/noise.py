@@ -17,6 +17,7 @@ from dataclasses import replace
 import numpy as np
 
 from fsid.errors import FsidError
+from fsid.sensor.arrays import check_floating
 from fsid.sensor.formula import noise_variance, with_noise
 from fsid.sensor.gaussian import standard_normal
 from fsid.sensor.mosaic import site_offsets
@@ -33,9 +34,10 @@ def variance(x: np.ndarray, level: NoiseLevel, cfa: str | None = None) -> np.nda
     """Noise variance `k max(x, 0) + sigma2` of the clean signal x, normalised units, same shape, float32.
 
     x is packed (4, h, w) in the order R, Gr, Gb, B, or a mosaic (H, W) together with its `cfa`. FsidError
-    for anything else.
+    for anything else, DN among it: `from_dn` makes x of them.
     """
     level.check()
+    check_floating(np.asarray(x), "the clean signal")
     x = np.asarray(x, np.float32)
     if cfa is None:
         if x.ndim != 3 or x.shape[0] != 4:

@@ -8,7 +8,6 @@ the network would learn the bias. Var(x) is that of stored data: rounding is a p
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,11 +29,14 @@ class NoiseLevel:
     sigma2: tuple[float, float, float, float]
 
     def check(self) -> None:
-        """FsidError unless these are variances of four sites, as a file or a caller may not give them."""
-        if len(self.k) != 4 or len(self.sigma2) != 4:
+        """FsidError unless these are variances of four sites in units of the white level, none beyond it."""
+        if np.shape(self.k) != (4,) or np.shape(self.sigma2) != (4,):
             raise FsidError(f"{self}: needs four values each, for the sites R, Gr, Gb, B")
-        if not all(0 <= value < math.inf for value in (*self.k, *self.sigma2)):
-            raise FsidError(f"{self}: k and sigma2 are variances, finite and not negative")
+        if not all(0 <= value <= 1 for value in (*self.k, *self.sigma2)):
+            raise FsidError(
+                f"{self}: k and sigma2 are variances in units of the white level; 0 to 1 is possible: divide "
+                "k in DN by white - black, sigma2 in DN^2 by its square"
+            )
 
 
 @dataclass(frozen=True, eq=False)
