@@ -156,8 +156,27 @@ def test_clean_levels_round_64_times_finer():
     fine = clean_levels(raw)
     assert (fine.black_level, fine.white_level) == (4096, 65472)
     assert np.max(np.abs(quantise(fine).mosaic - raw.mosaic)) <= 0.5001 / (64 * 959)
-    with pytest.raises(FsidError, match="white level 0 must be above 0"):
-        clean_levels(replace(raw, black_level=0, white_level=0))
+    with pytest.raises(FsidError, match="black level -1 is below 0"):
+        clean_levels(replace(raw, black_level=-1, white_level=1))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "named"),
+    [
+        ({"mosaic": [[0.1, 0.2], [0.3, 0.4]]}, "the mosaic is a list"),
+        ({"mosaic": np.zeros((4, 4), np.uint16)}, "the mosaic holds uint16"),
+        ({"cfa": "rggb"}, "'rggb' is not a Bayer pattern"),
+        ({"black_level": 0, "white_level": 0}, "black level 0 is not below white level 0"),
+        ({"black_level": (64, 65, 64, 64)}, "raw_from_dn"),
+        ({"black_level": np.full(4, 64)}, "raw_from_dn"),
+        ({"white_balance": (0.0, 1.0, 1.5)}, "three finite gains"),
+        ({"white_balance": None}, "three finite gains"),
+        ({"xyz_to_camera": np.zeros((1, 3, 3))}, r"xyz_to_camera has shape \(1, 3, 3\)"),
+    ],
+)
+def test_what_makes_no_raw_is_named_where_it_is_made(wrong, named):
+    with pytest.raises(FsidError, match=named):
+        replace(_flat(0.1), **wrong)
 
 
 @pytest.mark.parametrize("kind", [np.uint16, np.int16, np.uint32])
@@ -213,9 +232,9 @@ def test_nan_is_refused():
 
 def test_levels_that_no_camera_has_are_refused():
     raw = Raw(
-        np.zeros((2, 2), np.float32), "RGGB", 1023, 64, (1.0, 1.0, 1.0), np.eye(3), camera="upside down"
+        np.zeros((2, 2), np.float32), "RGGB", 64, 100_000, (1.0, 1.0, 1.0), np.eye(3), camera="too fine"
     )
-    with pytest.raises(FsidError, match="upside down"):
+    with pytest.raises(FsidError, match="too fine"):
         to_dn(raw)
 
 

@@ -50,10 +50,10 @@ def clean_levels(raw: Raw) -> Raw:
     """The same image with levels scaled by the largest power of two that 16 bits hold (64..1023: by 64).
 
     A clean image stored with them is rounded to 1/64 of the camera's DN, which is far below its noise.
-    FsidError for a white level of 0 or below.
+    FsidError for a black level below 0.
     """
-    if not raw.white_level > 0:
-        raise FsidError(f"{raw.camera}: white level {raw.white_level:g} must be above 0")
+    if raw.black_level < 0:
+        raise FsidError(f"{raw.camera}: black level {raw.black_level:g} is below 0")
     scale = 1 << max(int(MAX_DN / float(raw.white_level)).bit_length() - 1, 0)
     return replace(raw, black_level=raw.black_level * scale, white_level=raw.white_level * scale)
 

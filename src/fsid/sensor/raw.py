@@ -8,7 +8,9 @@ the network would learn the bias. Var(x) is that of stored data: rounding is a p
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -51,7 +53,8 @@ class Raw:
     iso: 0 where unknown. noise: None where unknown. metadata: of the file it was read from.
     NumPy's numbers become Python's: the square of a uint16 level would wrap around.
     Two are equal (==) where they are one and the same object; NumPy compares what they hold.
-    FsidError for a mosaic of another shape, or of integers: `from_dn` makes x of DN.
+    FsidError for what is none of the above, such as a mosaic of integers: `raw_from_dn` makes a Raw of DN,
+    with one black level or those of the sites.
     """
 
     mosaic: np.ndarray
@@ -66,12 +69,40 @@ class Raw:
     metadata: Metadata = Metadata()  # noqa: RUF009  frozen
 
     def __post_init__(self) -> None:
+        if not isinstance(self.mosaic, np.ndarray):
+            raise FsidError(f"the mosaic is a {type(self.mosaic).__name__}: give a NumPy array (H, W)")
         check_even(self.mosaic.shape)
-        if isinstance(self.mosaic, np.ndarray) and self.mosaic.dtype.kind != "f":
+        if self.mosaic.dtype.kind != "f":
             raise FsidError(f"the mosaic holds {self.mosaic.dtype}; give x = (DN - black) / (white - black)")
+        if self.cfa not in CFA_PATTERNS:
+            raise FsidError(f"cfa: {self.cfa!r} is not a Bayer pattern; use one of {', '.join(CFA_PATTERNS)}")
         for name in ("black_level", "white_level", "iso"):
             if isinstance(number := getattr(self, name), np.generic):
                 object.__setattr__(self, name, number.item())
+        object.__setattr__(self, "white_balance", _gains(self.white_balance))
+        self._check_levels()
+        if np.shape(self.xyz_to_camera) != (3, 3):
+            raise FsidError(f"xyz_to_camera has shape {np.shape(self.xyz_to_camera)}; expected (3, 3)")
+
+    def _check_levels(self) -> None:
+        levels = self.black_level, self.white_level
+        if not all(isinstance(level, int | float) for level in levels):
+            raise FsidError(
+                f"black and white level {levels}: must be one number each; raw_from_dn takes more"
+            )
+        if not levels[0] < levels[1]:
+            raise FsidError(f"black level {levels[0]:g} is not below white level {levels[1]:g}")
+
+
+def _gains(white_balance: Any) -> tuple[float, float, float]:
+    """FsidError unless they are three gains above 0."""
+    try:
+        r, g, b = map(float, white_balance)
+        if min(r, g, b) > 0 and math.isfinite(r + g + b):
+            return r, g, b
+    except (TypeError, ValueError):
+        pass
+    raise FsidError(f"white_balance {white_balance}: must be three finite gains above 0, of R, G and B")
 
 
 def check_even(shape: tuple[int, ...]) -> None:
