@@ -8,7 +8,7 @@ import tifffile
 from PIL import Image
 
 from fsid.errors import FsidError
-from fsid.sensor import CFA_PATTERNS, develop, pack, read_mosaic
+from fsid.sensor import CFA_PATTERNS, develop, pack, raw_from_dn, read_mosaic, unpack
 
 DN = np.random.default_rng(0).integers(0, 4096, (6, 8)).astype(np.uint16)
 CAMERA = {"cfa": "GRBG", "black_level": 256, "white_level": 4095}
@@ -154,3 +154,19 @@ def test_a_tiff_of_several_mosaics_is_refused(tmp_path):
     tifffile.imwrite(tmp_path / "a.tif", np.stack([DN, DN]), photometric="minisblack")
     with pytest.raises(FsidError, match=r"a\.tif: .*several mosaics"):
         read_mosaic(tmp_path / "a.tif", **CAMERA)
+
+
+def test_a_mosaic_in_memory_is_that_of_its_file(tmp_path):
+    """12 bits of an odd size, whose sites have black levels of their own."""
+    dn = np.random.default_rng(0).integers(200, 4000, (65, 67)).astype(np.uint16)
+    camera = {"cfa": "BGGR", "black_level": (240, 250.5, 256, 260), "white_level": 4095}
+    np.save(tmp_path / "a.npy", dn)
+    ours, stored = raw_from_dn(dn, **camera), read_mosaic(tmp_path / "a.npy", **camera)
+    np.testing.assert_array_equal(ours.mosaic, stored.mosaic)
+    levels = unpack(np.ones((4, 32, 33)) * np.reshape(camera["black_level"], (4, 1, 1)), "BGGR")
+    np.testing.assert_allclose(ours.mosaic, (dn[:64, :66] - levels) / (4095 - 252), atol=1e-6)
+    for wrong in (ours.mosaic, dn[None], dn.astype(np.int32) - 4000):
+        with pytest.raises(FsidError, match="the mosaic: holds"):
+            raw_from_dn(wrong, **camera)
+    with pytest.raises(FsidError, match="far beyond the white level 1023"):
+        raw_from_dn(dn, cfa="BGGR", black_level=256, white_level=1023)

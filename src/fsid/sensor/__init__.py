@@ -1,6 +1,6 @@
 """The camera: clean light to the RAW file that a named camera would have stored, and back to a picture."""
 
-from fsid.sensor.bare import Layout, read_mosaic
+from fsid.sensor.bare import Layout, raw_from_dn, read_mosaic
 from fsid.sensor.blind import NoiseEstimate, estimate_noise
 from fsid.sensor.calibrate import NoiseFit, fit_noise
 from fsid.sensor.camera_fit import Calibration, calibrate
@@ -76,6 +76,7 @@ __all__ = [
     "profile_names",
     "profile_of",
     "quantise",
+    "raw_from_dn",
     "read_mosaic",
     "read_raw",
     "save_profile",

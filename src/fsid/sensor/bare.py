@@ -1,4 +1,4 @@
-"""A mosaic without metadata: the caller says what the camera would have written beside it.
+"""A mosaic without metadata, in a file or in memory: the caller says what the camera would have written.
 
     .raw .bin   uint16 little endian, row by row, no header (`width` and `height` needed)
     .npy        integers (H, W), or packed (H/2, W/2, 4) in the order R, Gr, Gb, B
@@ -80,21 +80,51 @@ def read_mosaic(
 ) -> Raw:
     """The mosaic file at `path` as `Raw`; an odd last row or column is dropped.
 
-    width, height: pixels, needed for .raw and .bin, checked for the others where given. black_level: DN, of
-    all pixels or of the sites R, Gr, Gb, B. white_level: DN. xyz_to_camera: the mean of the published
-    matrices where None. FsidError: missing or unreadable file, wrong size, not integers, values above 16
-    bits, what looks like no Bayer mosaic.
+    width, height: pixels, needed for .raw and .bin, checked for the others where given. The rest is that of
+    `raw_from_dn`. FsidError: missing or unreadable file, wrong size, and as there.
     """
     check_cfa(cfa, f"{path}: cfa")
-    black = BlackLevels.stated(black_level, cfa, str(path))
-    for level in (black.tile.min(), black.tile.max()):
-        check_levels(level, white_level, str(path))
-    if len(white_balance) != 3 or not min(white_balance) > 0:
-        raise FsidError(f"{path}: white_balance {white_balance} must be three positive gains")
-    dn = read_dn(path, cfa=cfa, width=width, height=height)
-    check_bayer(dn, path)
-    level = round(black.mean())
-    check_white(dn, level, white_level, path)
+    return raw_from_dn(
+        read_dn(path, cfa=cfa, width=width, height=height),
+        cfa=cfa,
+        black_level=black_level,
+        white_level=white_level,
+        white_balance=white_balance,
+        xyz_to_camera=xyz_to_camera,
+        camera=camera,
+        iso=iso,
+        source=str(path),
+    )
+
+
+def raw_from_dn(
+    dn: np.ndarray,
+    *,
+    cfa: str,
+    black_level: float | Sequence[float],
+    white_level: int,
+    white_balance: tuple[float, float, float] = (1.0, 1.0, 1.0),
+    xyz_to_camera: np.ndarray | None = None,
+    camera: str = "unknown",
+    iso: float = 0.0,
+    source: str = "the mosaic",
+) -> Raw:
+    """A mosaic in memory, `dn` (H, W) integers as the camera stored them, as `Raw`.
+
+    An odd last row or column is dropped. cfa: of the first 2x2 pixels, row by row. black_level: DN, of all
+    pixels or of the sites R, Gr, Gb, B, fractions included; the Raw states their rounded mean. white_level:
+    DN. white_balance: gains of R, G, B. xyz_to_camera: (3, 3) DNG `ColorMatrix1` for D65, the mean of the
+    published matrices where None. source: for messages. FsidError: another shape, not integers, values above
+    16 bits, far beyond the white level, or such as no Bayer mosaic has.
+    """
+    check_cfa(cfa, f"{source}: cfa")
+    black = BlackLevels.stated(black_level, cfa, source)
+    for stated in (black.tile.min(), black.tile.max()):
+        check_levels(stated, white_level, source)
+    dn = _even(np.asarray(dn), source)
+    check_bayer(dn, source)
+    level, white_level = round(black.mean()), int(white_level)
+    check_white(dn, level, white_level, source)
     return Raw(
         mosaic=black.normalised(dn, level, white_level),
         cfa=cfa,
@@ -122,12 +152,20 @@ def read_dn(
         dn = _read(path, cfa, width, height)
     except OSError as error:
         raise FsidError(f"{path}: cannot be read ({error.strerror})") from None
-    if dn.ndim != 2 or min(dn.shape) < 2:
-        raise FsidError(f"{path}: holds an array of shape {dn.shape}, not a mosaic (height, width)")
-    if dn.dtype.kind not in "ui" or dn.min() < 0 or dn.max() > MAX_DN:
-        raise FsidError(f"{path}: holds {dn.dtype} values; a mosaic holds DN as integers from 0 to {MAX_DN}")
+    even = _even(dn, str(path))
     if (height or dn.shape[0], width or dn.shape[1]) != dn.shape:
         raise FsidError(f"{path}: is {dn.shape[1]}x{dn.shape[0]}, not {width}x{height}; correct the size")
+    return even
+
+
+def _even(dn: np.ndarray, source: str) -> np.ndarray:
+    """Without an odd last row or column; FsidError, naming `source`, unless it is a mosaic of DN."""
+    if dn.ndim != 2 or min(dn.shape) < 2:
+        raise FsidError(f"{source}: holds an array of shape {dn.shape}, not a mosaic (height, width)")
+    if dn.dtype.kind not in "ui" or dn.min() < 0 or dn.max() > MAX_DN:
+        raise FsidError(
+            f"{source}: holds {dn.dtype} values; a mosaic holds DN as integers from 0 to {MAX_DN}"
+        )
     return dn[: dn.shape[0] // 2 * 2, : dn.shape[1] // 2 * 2]
 
 

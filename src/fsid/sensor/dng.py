@@ -27,7 +27,7 @@ from fsid.sensor.colour import published_matrices
 from fsid.sensor.embedded import embedded_directories
 from fsid.sensor.intact import check_intact
 from fsid.sensor.metadata import Metadata, kept_metadata, libraw_metadata, taken
-from fsid.sensor.mosaic import CFA_PATTERNS, check_cfa
+from fsid.sensor.mosaic import CFA_PATTERNS
 from fsid.sensor.quantise import to_dn
 from fsid.sensor.raw import Raw
 from fsid.sensor.tiff import (
@@ -100,8 +100,10 @@ def read_header(path: str | Path) -> RawHeader:
         )
 
 
-def read_raw(path: str | Path) -> Raw:
+def read_raw(path: str | Path | BinaryIO) -> Raw:
     """Any Bayer RAW file as `Raw`: visible area, even size, levels, CFA of its first pixel, colour, noise.
+
+    path: or a binary file, read from its start, such as io.BytesIO of what a shard holds.
 
     Black levels that differ between sites (in a DNG in any pattern, between rows and columns too, and by
     fractions of a DN) are subtracted each; `black_level` is their rounded mean. Unknown colour becomes the
@@ -109,9 +111,9 @@ def read_raw(path: str | Path) -> Raw:
     FsidError: missing, truncated, zeros in place of pixels, no RAW, a bare mosaic, not Bayer (X-Trans,
     Foveon, linear DNG, monochrome), floating point.
     """
-    path = Path(path)
-    with _opened(path) as (file, source):
-        return _from_libraw(file, source, path)
+    given = Path(path) if isinstance(path, str) else path
+    with _opened(given) as (file, source):
+        return _from_libraw(file, source, _named(given))
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,17 +138,29 @@ def read_stored(path: str | Path) -> Stored:
         return replace(stored, dn=stored.dn.copy())  # LibRaw's memory goes with the file
 
 
+def _named(file: Path | BinaryIO) -> Path:
+    """What messages call a file."""
+    return file if isinstance(file, Path) else Path(str(getattr(file, "name", "the RAW file")))
+
+
 @contextmanager
-def _opened(path: Path) -> Iterator[tuple[rawpy.RawPy, _Source]]:
+def _opened(given: Path | BinaryIO) -> Iterator[tuple[rawpy.RawPy, _Source]]:
     """LibRaw's view of a file and its TIFF tags; whatever LibRaw or the disk refuses becomes one line."""
+    path = _named(given)
     try:
-        if not path.is_file():
+        if not isinstance(given, Path):
+            given.seek(0)
+            source = _read_source(given, path)
+            given.seek(0)
+        elif given.is_file():
+            with given.open("rb") as stream:
+                source = _read_source(stream, path)
+        else:
             raise FsidError(f"{path}: no such RAW file")
-        source = _read_source(path)
     except OSError as error:
         raise FsidError(f"{path}: cannot be read ({error.strerror})") from None
     try:
-        with rawpy.imread(str(path)) as file:
+        with rawpy.imread(str(given) if isinstance(given, Path) else given) as file:
             yield file, source
     except (rawpy.LibRawError, rawpy.NotSupportedError, NotImplementedError) as error:
         reason = error.args[0].decode() if error.args and isinstance(error.args[0], bytes) else error
@@ -171,17 +185,16 @@ def _dng_bytes(raw: Raw, preview: np.ndarray | None) -> bytes:
 
 
 def _check_storable(raw: Raw) -> None:
-    check_cfa(raw.cfa, raw.camera)
     levels = raw.black_level, raw.white_level
     if not all(isinstance(level, int) for level in levels):
         raise FsidError(
             f"{raw.camera}: black and white level {levels} are not whole DN, as a DNG states them"
         )
     gains = raw.white_balance
-    if len(gains) != 3 or not all(_LEAST_GAIN < gain < math.inf for gain in gains):
-        raise FsidError(f"{raw.camera}: white_balance {gains} must be three finite gains above {_LEAST_GAIN}")
-    if np.shape(raw.xyz_to_camera) != (3, 3) or not np.all(np.isfinite(raw.xyz_to_camera)):
-        raise FsidError(f"{raw.camera}: xyz_to_camera {raw.xyz_to_camera} must be (3, 3) finite numbers")
+    if not min(gains) > _LEAST_GAIN:
+        raise FsidError(f"{raw.camera}: white_balance {gains}: a DNG holds gains above {_LEAST_GAIN}")
+    if not np.all(np.isfinite(raw.xyz_to_camera)):
+        raise FsidError(f"{raw.camera}: xyz_to_camera {raw.xyz_to_camera} must hold finite numbers")
     if not math.isfinite(raw.iso):
         raise FsidError(f"{raw.camera}: iso {raw.iso} must be finite, 0 where unknown")
 
@@ -199,19 +212,16 @@ def _mosaic_directory(directories: list[dict[int, Tag]]) -> dict[int, Tag]:
     return next((d for d in directories if PHOTOMETRIC in d and d[PHOTOMETRIC].values == (CFA,)), {})
 
 
-def _read_source(path: Path) -> _Source:
-    with path.open("rb") as file:
-        directories = read_directories(file) or embedded_directories(file)
-        mosaic = _mosaic_directory(directories)
-        values: dict[int, Values] = {}
-        for directory in (*directories, mosaic):
-            values |= {code: tag.values for code, tag in directory.items()}
-        described = mosaic or dng_tags.camera_name(values) != "unknown"
-        if path.suffix.lower() in BARE_SUFFIXES and not described:  # LibRaw guesses
-            raise FsidError(
-                f"{path}: is a bare mosaic: write it as DNG first, see docs/capture-a-test-set.md"
-            )
-        check_intact(file, mosaic, path)
+def _read_source(file: BinaryIO, path: Path) -> _Source:
+    directories = read_directories(file) or embedded_directories(file)
+    mosaic = _mosaic_directory(directories)
+    values: dict[int, Values] = {}
+    for directory in (*directories, mosaic):
+        values |= {code: tag.values for code, tag in directory.items()}
+    described = mosaic or dng_tags.camera_name(values) != "unknown"
+    if path.suffix.lower() in BARE_SUFFIXES and not described:  # LibRaw guesses
+        raise FsidError(f"{path}: is a bare mosaic: write it as DNG first, see docs/capture-a-test-set.md")
+    check_intact(file, mosaic, path)
     if SAMPLE_FORMAT in mosaic and mosaic[SAMPLE_FORMAT].values == (_FLOATING_POINT,):
         raise FsidError(
             f"{path}: holds floating-point pixels, which LibRaw scales by a factor that it does not tell; "
@@ -300,7 +310,7 @@ def _cfa(file: rawpy.RawPy, colours: np.ndarray, path: Path) -> str:
 
 def _white_balance(file: rawpy.RawPy) -> tuple[float, float, float]:
     for gains in (file.camera_whitebalance, file.daylight_whitebalance):
-        if min(gains[:3]) > 0:
+        if min(gains[:3]) > 0 and math.isfinite(gains[0] / gains[1] + gains[2] / gains[1]):
             return gains[0] / gains[1], 1.0, gains[2] / gains[1]
     return 1.0, 1.0, 1.0
 
