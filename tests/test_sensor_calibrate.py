@@ -17,6 +17,7 @@ from fsid.sensor import (
     profile_of,
     save_profile,
     to_dn,
+    unpack,
 )
 
 PROFILE = load_profile("pixel6")
@@ -48,6 +49,20 @@ def test_the_line_of_a_simulated_burst_is_found_within_its_error(iso, flicker_dn
     np.testing.assert_allclose(fit.k_dn, k_dn, rtol=0.02)
     assert np.all(np.abs(fit.k_dn - k_dn) < 4.5 * fit.k_dn_error)
     assert np.all(np.abs(fit.sigma2_dn - sigma2_dn) < 4.5 * fit.sigma2_dn_error)
+
+
+def test_black_levels_of_sites_are_those_of_r_gr_gb_b():
+    black = (60, 66, 70, 75)
+    above = unpack(np.broadcast_to(np.reshape(black, (4, 1, 1)), (4, 80, 80)), PROFILE.cfa) - 64
+    rng, level = np.random.default_rng(2), PROFILE.level(800)
+    stats = TemporalStatistics(white_level=1023)
+    for _ in range(20):
+        frame = to_dn(noisy_from_clean(rng, _gradient(), 800, level)).astype(np.int64) + above
+        stats.add(frame.tolist())  # whatever holds whole numbers
+    fit = fit_noise([stats], cfa=PROFILE.cfa, white_level=1023, black_level=black)
+    np.testing.assert_array_equal(fit.black, black)
+    np.testing.assert_allclose(fit.k_dn, np.array(level.k) * PROFILE.span, rtol=0.04)
+    assert np.all(np.abs(fit.sigma2_dn / PROFILE.span**2 - level.sigma2) < 4.5 * fit.sigma2_dn_error)
 
 
 def test_dark_frames_give_black_and_read_noise():
@@ -158,6 +173,8 @@ def _frames(*images):
     [
         ([_frames(np.full((4, 4), 100))], 64, "two frames"),
         ([TemporalStatistics(1023)], 64, "two frames"),
+        ([], 64, "at least one burst"),
+        ([_frames(np.full((4, 4), 100))], (64, 65), "2 black levels"),
         ([_frames(np.full((40, 40), 100), np.full((40, 40), 101))], 64, "light levels"),
         ([_frames(np.full((40, 40), 1023), np.full((40, 40), 1023))], 64, "light levels"),
         ([_frames(np.full((4, 4), 100), np.full((4, 4), 100))], None, "dark frames or the black"),

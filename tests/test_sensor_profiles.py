@@ -10,7 +10,7 @@ import pytest
 
 from fsid.cli.iso_notes import note_extrapolation
 from fsid.errors import FsidError
-from fsid.sensor import far_extrapolated, load_profile, profile_names, save_profile
+from fsid.sensor import CameraProfile, far_extrapolated, load_profile, profile_names, save_profile
 from fsid.sensor.camera_profile import Measurement
 from fsid.sensor.iso_law import k_curve, k_law, sigma2_law
 
@@ -374,3 +374,29 @@ def test_a_fall_is_real_beyond_three_standard_errors_of_the_difference(standard_
     k[1] -= standard_errors * np.sqrt(2) * 1e-5
     found = np.array([k_curve(iso, k, error)(value) for value in iso])
     np.testing.assert_allclose(found, np.broadcast_to(k.mean(0), (2, 4)) if is_pooled else k, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "named"),
+    [
+        ({"k": [0.001] * 4}, "must be"),
+        ({"iso": (200, 100)}, "must rise"),
+        ({"k": np.full((2, 4), 2.0)}, "divide k in DN by white - black"),
+        ({"sigma2": np.full((2, 4), 0.5)}, "divide k in DN by white - black"),
+        ({"xyz_to_camera": np.eye(3)}, r"expected \(m, 3, 3\)"),
+    ],
+)
+def test_a_profile_made_by_hand_says_what_is_wrong_with_it(wrong, named):
+    by_hand = {"k": [[0.001] * 4, [0.002] * 4], "sigma2": [[1e-6] * 4, [2e-6] * 4], "iso": (100, 200)}
+    by_hand |= {"name": "mine", "camera": "Mine", "cfa": "RGGB", "black_level": np.int64(256)}
+    by_hand |= {"white_level": np.int64(4095), "bits": 12, "xyz_to_camera": [np.eye(3)]}
+    assert CameraProfile(**by_hand).level(100).k == pytest.approx((0.001,) * 4)
+    with pytest.raises(FsidError, match=f"profile mine: .*{named}"):
+        CameraProfile(**{**by_hand, **wrong})
+
+
+def test_no_profile_is_written_that_could_not_be_read(tmp_path):
+    lower = replace(load_profile("pixel6"), cfa="gbrg")
+    with pytest.raises(FsidError, match="profile pixel6: cfa: 'gbrg' is not a Bayer pattern"):
+        save_profile(tmp_path / "mine.yaml", lower)
+    assert not list(tmp_path.iterdir())

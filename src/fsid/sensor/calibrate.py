@@ -23,8 +23,10 @@ import numpy as np
 from scipy.special import gammaincinv
 
 from fsid.errors import FsidError
+from fsid.sensor.black_levels import BlackLevels
 from fsid.sensor.camera_profile import MONO
 from fsid.sensor.defects import defective
+from fsid.sensor.mosaic import pack
 from fsid.sensor.quantise import ROUNDING_DN2
 from fsid.sensor.stored_noise import PLACES, before_clipping, before_rounding, dark_noise
 from fsid.sensor.temporal import TemporalStatistics
@@ -94,20 +96,24 @@ def fit_noise(
     *,
     cfa: str | None,
     white_level: int,
-    black_level: float | None = None,
+    black_level: float | Sequence[float] | None = None,
     dark: TemporalStatistics | None = None,
 ) -> NoiseFit:
-    """The noise line of one ISO from one or more bursts of any exposures.
+    """The noise line of one ISO, in DN, from one or more bursts of any exposures.
 
-    cfa: None or "MONO" for a monochrome sensor. black_level: DN, needed where there are no `dark` frames.
-    FsidError where neither is given, or the bursts show less than two light levels.
+    cfa: None or "MONO" for a monochrome sensor. black_level: DN, of all pixels or of the sites R, Gr, Gb, B,
+    needed where there are no `dark` frames. FsidError where neither is given, where there is no burst, or
+    where the bursts show less than two light levels.
     """
+    if not bursts:
+        raise FsidError("calibration needs at least one burst of a lit scene")
     cfa = None if cfa == MONO else cfa
     if dark is not None:
         dark_samples, black = pool_dark(dark, cfa, white_level)
         pooled = [dark_samples]
     elif black_level is not None:
-        black, pooled = np.full(1 if cfa is None else 4, float(black_level)), []
+        tile = BlackLevels.stated(black_level, cfa, "black_level").tile
+        black, pooled = (tile[0, :1] if cfa is None else pack(tile, cfa).ravel()), []
     else:
         raise FsidError("calibration needs dark frames or the black level in DN")
     return fit_samples([*pooled, *(pool(burst, cfa, black, white_level) for burst in bursts)], black)

@@ -8,8 +8,10 @@ any ISO. sigma2 is the variance of stored data: the 1/12 DN^2 of rounding is a p
 
 from __future__ import annotations
 
+import operator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -57,6 +59,7 @@ class CameraProfile:
     xyz_to_camera: (m, 3, 3) matrices for D65 (DNG `ColorMatrix1`); `colour.colour_rand` blends them.
     date: of the data. measured: None where the source states no errors. terms: beyond the paper's model.
     optics: None where unknown. Two are equal (==) where they are one and the same object.
+    Lists become arrays. FsidError for tables of another shape, ISOs that do not rise, and variances in DN.
     """
 
     name: str
@@ -75,6 +78,29 @@ class CameraProfile:
     measured: Measurement | None = None
     terms: NoiseTerms = PAPER
     optics: Optics | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("k", "sigma2", "xyz_to_camera"):
+            object.__setattr__(self, name, np.asarray(getattr(self, name), np.float64))
+        for name in ("black_level", "white_level", "bits"):
+            object.__setattr__(self, name, operator.index(getattr(self, name)))
+        object.__setattr__(self, "iso", tuple(np.asarray(self.iso).tolist()))
+        where, shape = f"profile {self.name}", (len(self.iso), 4)
+        if not self.iso or self.k.shape != shape or self.sigma2.shape != shape:
+            raise FsidError(
+                f"{where}: k {self.k.shape} and sigma2 {self.sigma2.shape} must be {shape}: ISO, site"
+            )
+        if self.iso[0] <= 0 or any(b <= a for a, b in pairwise(self.iso)):
+            raise FsidError(f"{where}: ISOs must rise and be above 0; got {self.iso}")
+        if not (self.k.max() <= 1 and self.sigma2.max() < ROUNDING_DN2):  # in DN^2 it could not be less
+            raise FsidError(
+                f"{where}: k up to {self.k.max():g}, sigma2 up to {self.sigma2.max():g}: divide k in DN by "
+                f"white - black, sigma2 in DN^2 by its square, {self.span**2}"
+            )
+        if self.xyz_to_camera.shape[1:] != (3, 3):
+            raise FsidError(
+                f"{where}: xyz_to_camera has shape {self.xyz_to_camera.shape}; expected (m, 3, 3)"
+            )
 
     @property
     def span(self) -> int:

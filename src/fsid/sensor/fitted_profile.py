@@ -6,6 +6,7 @@ k = k_dn / span,      sigma2 = sigma2_dn / span^2,      span = white - black
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Mapping
 
 import numpy as np
@@ -38,7 +39,7 @@ def profile_of(
     dark_frames: how many the lines are from, by ISO; 0 where not stated. FsidError: no fit,
     an ISO that is none, or a white level not above the black level.
     """
-    isos = sorted(fits)
+    isos, white_level = sorted(fits), operator.index(white_level)
     if not isos or not all(0 < iso < math.inf for iso in isos):
         raise FsidError(f"a profile needs fits by ISO, numbers above 0; got {isos}")
     each = [fits[iso] for iso in isos]

@@ -91,12 +91,15 @@ def far_extrapolated(names: Iterable[str | Path], iso_min: float, iso_max: float
 
 
 def save_profile(path: str | Path, profile: CameraProfile) -> None:
-    """Write `profile` as the YAML that `load_profile` reads, whole or not at all."""
+    """Write `profile` as the YAML that `load_profile` reads, whole or not at all.
+
+    FsidError for a profile that it would refuse.
+    """
     write_atomically(Path(path), profile_file(profile))
 
 
 def profile_file(profile: CameraProfile) -> bytes:
-    """The content of the file that `save_profile` writes, numbers to 6 digits."""
+    """The content of the file that `save_profile` writes, numbers to 6 digits. Errors as there."""
     keys = ("name", "camera", "cfa", "bits", "black_level", "white_level", "date", "source", "notes")
     data = {key: getattr(profile, key) for key in keys}
     data |= {"xyz_to_camera": profile.xyz_to_camera.tolist()}
@@ -107,7 +110,9 @@ def profile_file(profile: CameraProfile) -> bytes:
     if profile.measured is not None and len(profile.iso) > 1:
         data["law"] = _law(profile)
     data["levels"] = [_level(profile, row) for row in range(len(profile.iso))]
-    return yaml.safe_dump(to_plain(data), sort_keys=False, default_flow_style=None, width=110).encode()
+    text = yaml.safe_dump(to_plain(data), sort_keys=False, default_flow_style=None, width=110)
+    _parse(text, f"profile {profile.name}")
+    return text.encode()
 
 
 def _switched_on(terms: NoiseTerms) -> dict[str, Any]:

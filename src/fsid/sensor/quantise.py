@@ -32,7 +32,11 @@ def to_dn(raw: Raw) -> np.ndarray:
 
 
 def from_dn(dn: np.ndarray, black_level: float, white_level: float) -> np.ndarray:
-    """Normalised float32 x of stored integers of any shape and type. FsidError unless black < white."""
+    """Normalised float32 x of stored integers of any shape and type. FsidError unless black < white.
+
+    black_level: of all pixels; `raw_from_dn` takes those of the sites.
+    """
+    dn = np.asarray(dn)
     if not black_level < white_level:
         raise FsidError(f"black level {black_level:g} is not below white level {white_level:g}")
     x = dn.astype(np.float32)

@@ -74,6 +74,7 @@ class TemporalStatistics:
         FsidError: no integers of 16 bits, another size, the light changed by more than 10 %, or the scene
         moved. A frame that is refused does not count; the burst may go on without it.
         """
+        dn = np.asarray(dn)
         _check_dn(dn, name)
         if self._first is None:
             self._start(dn)
