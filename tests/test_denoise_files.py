@@ -451,6 +451,22 @@ def test_the_python_interface(noisy_file: Path, network: Path) -> None:
     assert fsid.develop(clean).shape == (256, 320, 3)
 
 
+def test_what_is_no_network_noise_or_backend_is_named(network: Path) -> None:
+    """An unknown backend was taken for PyTorch."""
+    raw = noisy_raw()
+    with pytest.raises(FsidError, match="backend 'tensorrt': is not one of torch, onnx"):
+        load_model(network, backend="tensorrt")  # type: ignore[arg-type]
+    with pytest.raises(FsidError, match="a function is no network"):
+        fsid.denoise(raw, model=lambda raw: raw)
+    with pytest.raises(FsidError, match=r"replace\(raw, noise=level\)"):
+        fsid.denoise(raw, raw.noise, model=network)
+    with pytest.raises(FsidError, match="its ISO is unknown, give iso"):
+        fsid.denoise(replace(raw, iso=0.0), load_profile("pixel6"), model=network)
+    with pytest.raises(FsidError, match="a CameraProfile is no NoiseLevel"):
+        denoise_raw(raw, load_model(network), load_profile("pixel6"))  # type: ignore[arg-type]
+    assert len(repr(load_model(network))) < 2000  # what a notebook shows
+
+
 def test_a_path_is_not_denoised_before_it_is_read() -> None:
     with pytest.raises(FsidError, match="a str is no RAW image: give a Raw; read_raw reads one"):
         fsid.denoise("photo.dng")

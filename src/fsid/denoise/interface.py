@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 import torch
 
@@ -12,7 +12,7 @@ from fsid.denoise.files import noise_of
 from fsid.denoise.model import load_denoiser, model_path
 from fsid.denoise.onnx_denoiser import load_onnx, onnx_denoiser
 from fsid.errors import FsidError
-from fsid.sensor import CameraProfile, Raw, clean_levels
+from fsid.sensor import CameraProfile, NoiseLevel, Raw, clean_levels
 from fsid.sensor.profiles import check_bayer
 
 Backend = Literal["torch", "onnx"]
@@ -24,8 +24,10 @@ def load_model(model: str | Path | None = None, backend: Backend | None = None) 
     model: run folder, .safetensors or .onnx file, or the name of a shipped network; None: the default one.
     backend: what runs it, None: onnxruntime for an .onnx file, else PyTorch (on a GPU where there is one).
     PyTorch weights are converted for backend "onnx", which takes some seconds. FsidError: no such network,
-    a broken file, or an .onnx file for PyTorch.
+    a broken file, an .onnx file for PyTorch, or another backend.
     """
+    if backend not in (None, *get_args(Backend)):
+        raise FsidError(f"backend {backend!r}: is not one of {', '.join(get_args(Backend))}")
     path = model_path(model)
     if path.suffix.lower() == ".onnx":
         if backend == "torch":
@@ -52,12 +54,18 @@ def denoise(
     profile: a camera's noise profile, by name, file or as it was loaded, taken at `iso` or at the ISO of
     `raw`; None takes the noise level that `raw` knows, and else estimates it from the image. model: see
     `load_model`; load it once to denoise many images. strength: 0..1 is the share of the noise that is
-    removed, above 1 smooths more. Raises FsidError.
+    removed, above 1 smooths more. `denoise_raw` takes a noise level, tiles and a callback. Raises FsidError.
     """
     check_raw(raw)
+    if isinstance(profile, NoiseLevel):
+        raise FsidError("a NoiseLevel is no profile: it belongs to the image, replace(raw, noise=level)")
     network = load_model(model) if model is None or isinstance(model, str | Path) else model
+    if not hasattr(network, "averages"):
+        raise FsidError(f"model: a {type(network).__name__} is no network: give what load_model returns")
     if isinstance(profile, CameraProfile):
         check_bayer(profile, f"profile {profile.name}")
+        if iso is None and not raw.iso > 0:
+            raise FsidError(f"{raw.camera}: its ISO is unknown, give iso")
         level = profile.level(raw.iso if iso is None else iso)
     else:
         level = noise_of(raw, None if profile is None else str(profile), iso, Path(raw.camera)).level

@@ -57,7 +57,7 @@ class ModelCard:
 class Denoiser:
     """A network ready for use, in evaluation mode on `device`; the tiles of `denoise_raw` run through it."""
 
-    net: RawDenoiser
+    net: RawDenoiser = field(repr=False)
     card: ModelCard
     device: torch.device
 
