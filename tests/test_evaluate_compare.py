@@ -25,6 +25,7 @@ from fsid.evaluate import (
     psnr,
     read_testset,
     simulated_testset,
+    write_comparison,
     write_results,
 )
 from fsid.evaluate.compare import Row, confidence
@@ -465,3 +466,17 @@ def test_a_folder_of_results_is_tried_before_the_work_and_costs_no_table(
     told = capsys.readouterr()
     assert "results.json: cannot be written" in told.err
     assert "PSNR raw" in told.out
+
+
+def test_a_folder_by_itself_is_a_list_of_one(small_set: Path, photos: Path, tmp_path: Path):
+    """A text is a list of letters for Python."""
+    made = photo_testset(str(photos), tmp_path / "one", camera="pixel6", isos=[800, 3200], seed=3)
+    assert made == read_testset(small_set)
+    assert [*made.captures(str(small_set))] == [*made.captures(small_set)]
+
+
+def test_one_s_own_denoiser_has_the_report_too(small_set: Path, tmp_path: Path):
+    mine = Method("mine", "nothing", lambda raw: dataclasses.replace(raw, mosaic=0.9 * raw.mosaic))
+    write_comparison(compare(small_set, [NOISY, mine], crop_levels=["iso800"]), str(small_set), str(tmp_path))
+    assert "mine" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert {path.name for path in tmp_path.iterdir()} == {"report.html", "results.json", "images.csv"}

@@ -6,10 +6,15 @@ import contextlib
 import errno
 import fcntl
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from fsid.errors import FsidError
+
+
+def paths_of(paths: str | Path | Iterable[str | Path]) -> list[Path]:
+    """Paths of a list of them, or of one: a text is a list of letters for Python."""
+    return [Path(paths)] if isinstance(paths, str | Path) else [Path(path) for path in paths]
 
 
 def write_atomically(path: Path, data: bytes) -> None:

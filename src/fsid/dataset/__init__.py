@@ -11,6 +11,7 @@ from fsid.dataset.picture import check_png, contact_sheet, grid, save_png
 from fsid.dataset.pictures import check_pictures, find_pictures
 from fsid.dataset.sample import encode, make_frame, make_sample, remake, scene_of, to_uint8
 from fsid.dataset.shards import find_shards, read_member, shard_keys, shard_path, write_shard
+from fsid.dataset.worker import rendering
 
 __all__ = [
     "RENDERED",
@@ -40,6 +41,7 @@ __all__ = [
     "read_member",
     "read_photo",
     "remake",
+    "rendering",
     "sample_key",
     "save_png",
     "scene_of",

@@ -34,9 +34,10 @@ def scene_of(config: GenerateConfig, seed: int, index: int) -> Scene:
 
 
 def make_sample(config: GenerateConfig, seed: int, index: int, renderer: SceneRenderer | None) -> Sample:
-    """Sample `index` of the dataset (`config`, `seed`).
+    """Sample `index` of the dataset (`config`, `seed`), as `fsid generate` makes it.
 
-    renderer: needed unless `config.images` names a folder of pictures. FsidError as in `make_frame`.
+    renderer: that of `rendering(config)`, whose settings are the configuration's; other ones make another
+    picture. None where `config.images` names a folder of pictures. FsidError as in `make_frame`.
     """
     frame, place = _place_of(config, index)
     return make_frame(config, seed, frame, renderer)[place]

@@ -14,6 +14,7 @@ from pathlib import Path
 from fsid.denoise.denoise import Network, check_strength, denoise_raw
 from fsid.denoise.preview import preview_of
 from fsid.errors import FsidError
+from fsid.files import paths_of
 from fsid.sensor import (
     Layout,
     NoiseLevel,
@@ -200,7 +201,7 @@ def denoise_folder(
     failed: told of each file that cannot be denoised; FsidError says in the end how many they were. What is
     wrong with all of them `check_options` tells before.
     """
-    target, paths = Path(target), list(map(Path, sources))
+    target, paths = Path(target), paths_of(sources)
     names = [path.stem for path in paths]
     if twice := sorted({name for name in names if names.count(name) > 1}):
         raise FsidError(f"{paths[0].parent}: several files would become {twice[0]}.dng; rename one")

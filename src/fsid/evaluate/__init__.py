@@ -1,13 +1,14 @@
 """Metrics, test sets, comparisons and the report.
 
-`experiments` and `demo` need PyTorch and are imported by name, and so does a trained model; the rest runs
-without it.
+`fsid.evaluate.experiments` and `fsid.evaluate.demo` need PyTorch and are imported by name; a trained model
+(`model_method`, `evaluate_models`) needs it when it is loaded; the rest runs without it.
 """
 
 from fsid.evaluate.bursts import TruthQuality, burst_testset
 from fsid.evaluate.classical import denoise_classical
 from fsid.evaluate.compare import CLASSICAL, NOISY, Comparison, Method, Row, compare, write_results
 from fsid.evaluate.metrics import psnr, ssim
+from fsid.evaluate.models import evaluate_models, model_method, write_comparison
 from fsid.evaluate.simulated import simulated_testset
 from fsid.evaluate.testset import TestImage, TestSet, photo_testset, read_testset
 
@@ -23,10 +24,13 @@ __all__ = [
     "burst_testset",
     "compare",
     "denoise_classical",
+    "evaluate_models",
+    "model_method",
     "photo_testset",
     "psnr",
     "read_testset",
     "simulated_testset",
     "ssim",
+    "write_comparison",
     "write_results",
 ]

@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Literal
@@ -142,12 +142,22 @@ def scale_config(kind: Kind, scale: str) -> ExperimentConfig:
     raise FsidError(f"--scale {scale}: choose smoke, cpu or paper")
 
 
-def experiment(out: Path, config: ExperimentConfig, bar: ProgressBar, *, workers: int = 1) -> Path:
+@contextmanager
+def _silent(label: str, unit: str) -> Iterator[Callable[[int, int], None]]:
+    yield lambda done, total: None
+
+
+def experiment(
+    out: str | Path, config: ExperimentConfig, bar: ProgressBar = _silent, *, workers: int = 1
+) -> Path:
     """Run it in `out`, or go on with it; returns the path of the report.
 
-    Writes results.json (the rows of all test sets), images.csv and report.html. bar(label, unit): a context
-    manager that yields progress(done, total).
+    Writes results.json (the rows of all test sets), images.csv and report.html. config: of `scale_config`, or
+    one's own. bar(label, unit): for every stage a context manager that yields its progress(done, total).
+    workers: processes that render; they import the calling script, so a script calls this under `if __name__
+    == "__main__":`.
     """
+    out = Path(out)
     _check(out, config, bar, workers)
     with claimed(out, config, "experiment"):
         _check_noise(out, config)

@@ -9,22 +9,20 @@ from pathlib import Path
 from fsid.counted import counted
 from fsid.errors import FsidError
 from fsid.evaluate.compare import CLASSICAL, NOISY, Comparison, Method, compare, write_images, write_results
-from fsid.evaluate.comparison_report import comparison_sections
-from fsid.evaluate.report import write_report
 from fsid.evaluate.testset import read_testset
 
 
-def model_method(path: Path, name: str) -> Method:
-    """A trained model as a method; its card says what it was trained on. It needs PyTorch."""
+def model_method(path: str | Path, name: str) -> Method:
+    """A trained model (as `load_model` takes it) as a method; its card says what it was trained on."""
     from fsid.denoise import denoise_raw, load_model
 
     model = load_model(path)
     return Method(name, model.card.training, lambda raw: denoise_raw(raw, model))
 
 
-def model_names(models: Sequence[Path]) -> list[str]:
+def model_names(models: Sequence[str | Path]) -> list[str]:
     """What models are called in results: by folder or file, or as given where those names are the same."""
-    short = [_short_name(path) for path in models]
+    short = [_short_name(Path(path)) for path in models]
     taken = Counter([NOISY.name, CLASSICAL.name, *short])
     names = [str(path) if taken[name] > 1 else name for path, name in zip(models, short, strict=True)]
     for at, name in enumerate(names):
@@ -45,20 +43,27 @@ def _short_name(path: Path) -> str:
 
 
 def evaluate_models(
-    testset: Path,
-    models: Sequence[Path],
+    testset: str | Path,
+    models: Sequence[str | Path],
     *,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Comparison:
-    """Compare the baselines and `models`, with pictures of the middle level."""
+    """Compare the baselines and `models` (as `load_model` takes them), with crops of the middle level."""
     levels = read_testset(testset).levels
     named = zip(models, model_names(models), strict=True)
     methods = [NOISY, CLASSICAL, *(model_method(path, name) for path, name in named)]
     return compare(testset, methods, crop_levels=levels[len(levels) // 2 :][:1], progress=progress)
 
 
-def write_comparison(comparison: Comparison, testset: Path, out: Path) -> None:
-    """Write results.json, images.csv and report.html of the comparison on `testset` into `out`."""
+def write_comparison(comparison: Comparison, testset: str | Path, out: str | Path) -> None:
+    """Write results.json, images.csv and report.html of the comparison on `testset` into `out`.
+
+    The report shows the crops that `compare` was asked for.
+    """
+    from fsid.evaluate.comparison_report import comparison_sections  # they take a second to import
+    from fsid.evaluate.report import write_report
+
+    testset, out = Path(testset), Path(out)
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:

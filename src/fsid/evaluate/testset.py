@@ -27,7 +27,7 @@ from fsid.config import from_plain, to_plain
 from fsid.dataset import find_photos, read_photo
 from fsid.dataset.pictures import pictures_digest
 from fsid.errors import FsidError
-from fsid.files import held, write_atomically
+from fsid.files import held, paths_of, write_atomically
 from fsid.sensor import (
     CameraProfile,
     Raw,
@@ -89,17 +89,18 @@ class TestSet:
         if len(sets) > 1 and ALL_SETS in sets:
             raise FsidError(f"{ALL_SETS}: means all sets together, so no single one; rename its folder")
 
-    def clean(self, root: Path, image: TestImage, level: str = "") -> Path:
+    def clean(self, root: str | Path, image: TestImage, level: str = "") -> Path:
         """Path of the truth of `image` (at `level`)."""
+        root = Path(root)
         own = root / image.name / f"{level}.clean.dng"
         return own if own.exists() else root / image.name / "clean.dng"
 
-    def noisy(self, root: Path, image: TestImage, level: str, frame: int = 0) -> Path:
+    def noisy(self, root: str | Path, image: TestImage, level: str, frame: int = 0) -> Path:
         """Path of a capture of `image` at `level`."""
         suffix = f".{frame:02d}" if frame else ""
-        return root / image.name / f"{level}.noisy{suffix}.dng"
+        return Path(root) / image.name / f"{level}.noisy{suffix}.dng"
 
-    def captures(self, root: Path) -> Iterator[Path]:
+    def captures(self, root: str | Path) -> Iterator[Path]:
         """Paths of all captures."""
         for image, level, frame in product(self.images, self.levels, range(self.frames)):
             yield self.noisy(root, image, level, frame)
@@ -128,7 +129,7 @@ def read_testset(root: str | Path) -> TestSet:
 
 
 def photo_testset(
-    folders: Iterable[str | Path],
+    folders: str | Path | Iterable[str | Path],
     out: str | Path,
     *,
     camera: str | Path,
@@ -146,7 +147,7 @@ def photo_testset(
     """
     profile = load_bayer_profile(camera)
     levels = levels_of(profile, isos, luxes)
-    sources = [Path(folder) for folder in folders]
+    sources = paths_of(folders)
     names = [folder.resolve().name for folder in sources]
     if twice := [name for name in names if names.count(name) > 1]:
         raise FsidError(f"{twice[0]}: two folders have this name, and it is that of a set; rename one")

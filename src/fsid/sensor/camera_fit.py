@@ -19,6 +19,7 @@ import numpy as np
 
 from fsid.counted import counted
 from fsid.errors import FsidError
+from fsid.files import paths_of
 from fsid.sensor.calibrate import (
     NoiseFit,
     Samples,
@@ -61,10 +62,10 @@ class Calibration:
 
 
 def calibrate(
-    paths: Iterable[str | Path],
+    paths: str | Path | Iterable[str | Path],
     *,
     name: str,
-    dark: Iterable[str | Path] = (),
+    dark: str | Path | Iterable[str | Path] = (),
     layout: Layout = Layout(),
     camera: str | None = None,
     tie_greens: bool = False,
@@ -73,12 +74,13 @@ def calibrate(
 ) -> Calibration:
     """Noise profile `name` of a camera from bursts of static scenes, `paths`, and of the covered lens.
 
+    paths, dark: files and folders, or one of them.
     layout: what bare mosaics do not say. camera: name for the profile, else the files'. tie_greens: one
     line for Gr and Gb. terms: measure what there is beyond k and sigma2 too (`terms_fit`) and switch it on.
     FsidError: mixed cameras, lone frames, moving scene, saturated or too few frames, dark frames that are
     not dark.
     """
-    found = find_frames(list(map(Path, paths)), list(map(Path, dark)), layout)
+    found = find_frames(paths_of(paths), paths_of(dark), layout)
     isos = sorted({frame.iso for frame in found.frames})
     reader = _Reader(found, layout, progress, terms=terms)
     seen = found.camera
