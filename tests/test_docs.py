@@ -9,6 +9,7 @@ import shutil
 import tarfile
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ import pytest
 from fsid.cli.main import COMMANDS, main
 from fsid.dataset.index import index_mosaics
 from fsid.evaluate import read_testset
-from fsid.sensor import Raw, load_profile, noisy_from_clean, read_raw, to_dn, write_dng
+from fsid.sensor import Raw, load_profile, noisy_from_clean, pack, read_raw, to_dn, write_dng
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 GUIDES = (
@@ -203,6 +204,24 @@ def test_the_python_of_the_guide_to_clusters_makes_one_dataset_of_two(
     found = index_mosaics("all")
     assert [m.key for m in found] == [f"{seed}-{i:08d}" for seed in range(2) for i in range(3)]
     assert [m.scene for m in found] == 2 * [0, 1, 2]  # the pictures that both are of
+
+
+def test_the_guide_to_python_runs_and_makes_what_the_commands_make(
+    photos: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(photos, tmp_path / "photographs")
+    text = (REPOSITORY / "docs" / "python.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"```python\n(.*?)```", text, re.S)
+    found: dict[str, Any] = {"__name__": "__main__"}
+    exec(compile("\n".join(blocks), "python.md", "exec"), found)
+    frame, scene = found["frame"], found["scene"]
+    assert (frame.object_id == len(scene.objects) - 1).any()  # the mug that was put into the picture
+    pairs = found["Pairs"](found["config"], seed=0, count=2)
+    np.testing.assert_array_equal(pairs[1][0], pack(found["noisy"].mosaic, found["noisy"].cfa))
+    pairs.opened.__exit__(None, None, None)
+    assert "mine" in Path("measured/report.html").read_text(encoding="utf-8")
+    assert read_raw("grainy.dng").iso == 800
 
 
 def test_the_readme_names_every_command_and_no_other():
