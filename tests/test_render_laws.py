@@ -11,8 +11,9 @@ from scipy.ndimage import binary_erosion
 
 from fsid.assets import Mesh
 from fsid.render import Frame, Renderer
-from fsid.render.drawable import Drawable, View, background_drawable
-from fsid.scene.model import Background, Camera, Light, Transform
+from fsid.render.drawable import BACKGROUND_ID, Drawable, View, background_drawable
+from fsid.render.shadows import Source, Tile, plan_shadows
+from fsid.scene.model import Background, Camera, Light, Sky, Transform
 from render_scenes import (
     FROM_ABOVE,
     STILL,
@@ -176,6 +177,41 @@ def test_ground_far_behind_all_that_shades_it_has_its_shadow(renderer: Renderer)
     floor = frame.object_id == 0
     assert (frame.radiance[floor & (from_centre < 0.06), 0] < 0.02 * lit).all()
     np.testing.assert_allclose(frame.radiance[floor & (from_centre > 0.16), 0], lit, rtol=2e-3)
+
+
+def test_a_small_thing_in_the_sun_has_its_shadow_whatever_stands_far_away(renderer: Renderer) -> None:
+    """A ball of 2 cm seen close by, above the ground; and with a block 20 m away, out of the picture."""
+    sun = Light("sun", (0.0, 0.0, 0.0), (0.6, 0.0, -0.8), (2.0, 2.0, 2.0), 0.0047, 360.0)
+    camera = replace(FROM_ABOVE, position_m=(0.0, 0.0, 0.4))
+    ground = lambertian(grid(60.0), object_id=BACKGROUND_ID)
+    ball = lambertian(sphere(0.01), at=replace(STILL, position_m=(0.0, 0.0, 0.02)))
+    far = lambertian(block((1.0, 1.0, 3.0)), at=replace(STILL, position_m=(-14.0, 14.0, 0.0)))
+    sky = Sky("procedural", (1e-6,) * 3)
+    near = replace(view(ground, ball, lights=(sun,), camera=camera), sky=sky)
+    alone = draw(renderer, near).radiance
+    assert (alone < 0.05 * alone.max()).any()
+    both = draw(renderer, replace(near, drawables=(*near.drawables, far))).radiance
+    assert np.abs(both - alone).mean() < 0.02 * alone.max() * (alone < 0.5 * alone.max()).mean()
+    assert np.abs(both - alone).max() < 0.4 * alone.max()
+
+
+def test_the_sun_s_texels_stay_where_they_are_when_the_camera_moves() -> None:
+    """The nearer tile of a camera that has moved a little is that of the first, by whole texels aside."""
+    sun = Source(Light("sun", (0.0, 0.0, 0.0), (0.3, -0.6, -0.6), (1.0, 1.0, 1.0), 0.0047, 360.0))
+    casters = np.array([[0.0, 0.0, 0.0, 1.0], [15.0, 8.0, 1.0, 2.0]])
+    points = np.array([[0.0, 0.0, 1.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
+
+    def nearer(looked_at: np.ndarray) -> Tile:
+        whole, tile = plan_shadows([sun], casters, casters, looked_at, 1024).tiles
+        assert tile.focal > 4 * whole.focal
+        return tile
+
+    first = nearer(points)
+    for step in (0.0003, 0.002, 0.05):
+        other = nearer(points + step * np.array([1.0, 0.7, 0.2]))
+        texels = (other.origin - first.origin) @ first.axes[:2].T * first.focal * first.px / 2
+        assert other.focal == first.focal
+        np.testing.assert_allclose(texels, np.round(texels), atol=1e-6)
 
 
 @pytest.fixture

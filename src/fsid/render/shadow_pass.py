@@ -21,8 +21,6 @@ from fsid.render.shadows import NEAR_M, ShadowPlan, Tile
 from fsid.render.stage import Stage
 from fsid.render.targets import Targets
 
-SUN_MIDDLE = 0.5  # as in shaders/shadows.glsl
-
 
 class ShadowPass:
     """Owns the atlas. taps: the texture of `fsid.render.quality.tap_table`. grid, compute: as in `Targets`.
@@ -66,7 +64,7 @@ class ShadowPass:
             if any(sees(shot, tile, far) for shot, far in zip(shots, deepest_m, strict=True))
         ]
         for tile in seen:
-            self._atlas.framebuffer.viewport = (*tile.corner, stage.plan.tile_px, stage.plan.tile_px)
+            self._atlas.framebuffer.viewport = (*tile.corner, tile.px, tile.px)
             set_uniforms(
                 self._depth,
                 origin=tile.origin,
@@ -76,10 +74,11 @@ class ShadowPass:
             )
             buffers.draw(array, draw_commands(geometry.ranges, _casters(stage, tile)))
         self._context.enable_only(moderngl.NOTHING)
-        canvas, half = self._atlas.begin_moments(), stage.plan.tile_px // 2
+        canvas = self._atlas.begin_moments()
         for tile in seen:
-            self._moments.set(middle=SUN_MIDDLE if tile.range_m > 0 else 0.0)
-            self._moments.draw(canvas, (tile.corner[0] // 2, tile.corner[1] // 2, half, half))
+            self._moments.set(middle=tile.middle)
+            box = (tile.corner[0] // 2, tile.corner[1] // 2, tile.px // 2, tile.px // 2)
+            self._moments.draw(canvas, box)
         self._atlas.end_moments()
 
     def draw_blocks(self, targets: Targets, stage: Stage, buffers: Buffers, shot: Shot) -> None:
@@ -118,9 +117,12 @@ def _deepest_m(spheres: np.ndarray, shot: Shot) -> float:
 def _casters(stage: Stage, tile: Tile) -> np.ndarray:
     """Numbers of the drawables that can shade something in the tile."""
     seen = stage.casts.copy()
+    spheres, half = stage.geometry.spheres, 1.0 / tile.focal
     if tile.range_m == 0:
-        tangent = 1.0 / tile.focal
-        seen &= in_view(stage.geometry.spheres, tile.origin, tile.axes, (tangent, tangent))
+        seen &= in_view(spheres, tile.origin, tile.axes, (half, half))
+    else:
+        aside = np.abs((spheres[:, :3] - tile.origin) @ tile.axes[:2].T)
+        seen &= (aside < half + spheres[:, 3:]).all(1)
     if tile.lamp >= 0:
         seen[tile.lamp] = False
     return np.flatnonzero(seen)

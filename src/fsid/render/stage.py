@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fsid.render.camera import lens_of
 from fsid.render.drawable import BACKGROUND_ID, Drawable, View
 from fsid.render.geometry import Geometry, merge
 from fsid.render.lamps import lamps_of
@@ -14,7 +15,7 @@ from fsid.render.layers import Layer
 from fsid.render.room import Room, light_room, light_sky
 from fsid.render.shadows import ShadowPlan, Source, plan_shadows
 from fsid.render.sky import panorama
-from fsid.scene.model import Material
+from fsid.scene.model import Camera, Material
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,12 +66,29 @@ def stage_of(view: View, layers: Mapping[tuple[str, int], Layer], time_s: float,
     return Stage(
         view,
         geometry,
-        plan_shadows(sources, geometry.spheres[casts & movable], geometry.spheres, shadow_px),
+        plan_shadows(
+            sources, geometry.spheres[casts & movable], geometry.spheres, _looked_at(view.camera), shadow_px
+        ),
         light_sky(sky) if sky is not None else _lit_room(view, sources, albedo_of),
         sky,
         casts,
         np.array([drawable.is_glass for drawable in view.drawables]),
     )
+
+
+_LOOKED_AT = 2.0
+"""Distance from the camera up to which it looks at things, relative to its target's."""
+
+_WIDEST_LOOK = 1.0  # tangent
+
+
+def _looked_at(camera: Camera) -> np.ndarray:
+    """(5, 3) the camera, and corners of what it sees farther away than its target."""
+    lens = lens_of(camera)
+    far_m = _LOOKED_AT * float(np.linalg.norm(np.subtract(camera.target_m, camera.position_m)))
+    x, y = (min(1 / focal, _WIDEST_LOOK) for focal in lens.seen_focal)
+    rays = np.array([(0.0, 0.0, 0.0), (x, y, 1.0), (x, -y, 1.0), (-x, y, 1.0), (-x, -y, 1.0)])
+    return np.asarray(lens.position + far_m * rays @ lens.rotation)
 
 
 def _shades_outdoors(drawable: Drawable, view: View) -> bool:

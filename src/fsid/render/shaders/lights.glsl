@@ -18,7 +18,7 @@ struct Light {
     float focal, border;     // of the tiles: in half tiles; tangent units
     int kind, first_tile, tile_count;
     float range_m;           // of the sun's tile
-    vec3 half_width, half_height;   // of an area light
+    vec3 half_width, half_height;   // of an area light; of the sun where its nearer tile is, see _fill_nearer
 };
 
 Light light_at(int i) {

@@ -7,14 +7,14 @@ uniform int filter_taps;
 uniform float tile_px;
 
 const float SHADOW_NEAR = 0.02;
-const float SUN_MIDDLE = 0.5;    // as in fsid.render.shadow_pass
+const float SUN_MIDDLE = 0.5;    // of the sun's first tile, as in fsid.render.shadows
 const float BIAS_M = 0.0015;
 const float SHARP_TEXELS = 3.0, SOFT_TEXELS = 8.0;   // radius of the penumbra: below, above, blended between
 const float LEAK = 0.1;          // share of light that overlapping occluders let through, cut off
 const float STEEPEST = 12.0;     // tangent of the steepest receiver that is followed
 const float DARK = 0.98;         // share of the search that is blocked where nothing more is looked for
 const float TRACE = 1e-4, BEGUN = 0.003;   // taps of the search blocked: below no shadow, above all of it
-const int TILE_COLUMNS = 6;
+const int TILE_COLUMNS = 6, NEAR_CELLS = 2;   // as in fsid.render.shadows
 
 // Where a receiver is in its tile. u = 1 - window depth - middle is near / z (of the sun: 1/2 - z / range), which
 // is linear over the tile for every plane.
@@ -28,11 +28,11 @@ struct Receiver {
     float texel, tile_size;   // of the depth; tile units
     mat2 spread;           // how far the light's half axes move a shadow, per difference of u; tile units
     float search;          // radius of what may shade it, tile units
-    bool inside;           // the tile; beyond the sun's nothing casts shadows
+    bool inside;           // the tile; beyond the sun's first one nothing casts shadows
 };
 
 Receiver receiver_of(Light light, vec3 d, vec3 n) {
-    bool one = light.tile_count == 1;
+    bool one = light.tile_count < 6;
     vec3 a = abs(d);
     int axis = a.x >= a.y && a.x >= a.z ? 0 : a.y >= a.z ? 1 : 2;
     float side = d[axis] < 0.0 ? -1.0 : 1.0;
@@ -48,19 +48,24 @@ Receiver receiver_of(Light light, vec3 d, vec3 n) {
     Receiver r;
     vec2 atlas = 2.0 * vec2(textureSize(shadow_moments, 0));
     vec2 at = sun ? q.xy : q.xy / q.z;
+    vec2 aside = at - light.half_width.xy;
+    bool nearer = sun && light.tile_count == 2 && max(abs(aside.x), abs(aside.y)) < light.half_height.x;
+    at = nearer ? aside : at;
+    tile += nearer ? 1 : 0;
+    float side_px = nearer ? float(NEAR_CELLS) * tile_px : tile_px;
     float facing = sun ? m.z : dot(m, q);
     float toward = (facing < 0.0 ? -1.0 : 1.0) / max(abs(facing), 1e-6);
-    r.middle = sun ? SUN_MIDDLE : 0.0;
+    r.middle = nearer ? light.half_height.y : sun ? SUN_MIDDLE : 0.0;
     r.farthest = -r.middle;
     r.u = sun ? 1.0 - q.z / light.range_m - r.middle : SHADOW_NEAR / q.z;
     r.slope = m.xy * toward * (sun ? 1.0 / light.range_m : SHADOW_NEAR);
     float steep = sun ? STEEPEST / light.range_m : STEEPEST * r.u;
     r.slope *= min(1.0, steep / max(length(r.slope), 1e-12));
     r.bias = sun ? BIAS_M / light.range_m : BIAS_M * r.u * r.u / SHADOW_NEAR;
-    r.tile_size = 2.0 / light.focal;
-    r.texel = r.tile_size / tile_px;
+    r.tile_size = nearer ? 2.0 * light.half_width.z : 2.0 / light.focal;
+    r.texel = r.tile_size / side_px;
     r.inside = !sun || max(abs(at.x), abs(at.y)) < 0.5 * r.tile_size;
-    r.to_atlas = tile_px / (atlas * r.tile_size);
+    r.to_atlas = side_px / (atlas * r.tile_size);
     r.corner = vec2(tile % TILE_COLUMNS, tile / TILE_COLUMNS) * tile_px / atlas;
     r.centre = r.corner + r.to_atlas * (0.5 * r.tile_size + at);
     float per_u = sun ? light.range_m : 1.0 / SHADOW_NEAR;
@@ -70,7 +75,8 @@ Receiver receiver_of(Light light, vec3 d, vec3 n) {
     float size = max(length(r.spread[0]), length(r.spread[1]));
     float nearest = sun ? 1.0 - r.middle - r.u : 2.0 * r.u;    // difference of u to the nearest blocker looked for
     float widest = max(light.border - 0.01, 2.0 * r.texel);
-    r.search = clamp(size * nearest, 2.0 * r.texel, sun ? light.border : widest);
+    float border = nearer ? light.half_width.z - light.half_height.x : light.border;
+    r.search = clamp(size * nearest, 2.0 * r.texel, sun ? border : widest);
     return r;
 }
 
