@@ -96,7 +96,7 @@ def merge(drawables: Sequence[Drawable], layer_of: Callable[[Material], Layer], 
         numbers = np.arange(number, number + len(clear), dtype=np.uint32) | clear << 31
         whole.vertices["surface"][rows] = numbers.take(shape.part)
         np.add(shape.indices, np.uint32(vertex), out=whole.indices[index:last])
-        thickness_m = _GLASS_SHARE * (shape.high - shape.low).min() * min(map(abs, drawable.transform.scale))
+        thickness_m = _GLASS_SHARE * np.abs((shape.high - shape.low) * drawable.transform.scale).min()
         for material in drawable.materials:
             surface = _surface(drawable, material, layer_of(material), thickness_m)
             surface["place"][:, :3], surface["place"][:, 3] = rotation, position
