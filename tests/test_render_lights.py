@@ -292,6 +292,26 @@ def test_glass_is_as_thick_as_its_scale_makes_it(renderer: Renderer) -> None:
     np.testing.assert_allclose(images[1], images[0], atol=0.02)
 
 
+def test_edges_against_the_sky_have_no_outlines_behind_glass(renderer: Renderer) -> None:
+    """Blue and red posts before the sky, moved by a slanted pane: no single pixel between one colour and the
+    next has a third one."""
+    camera = Camera((0.0, -2.0, 0.5), (0.0, 0.0, 0.5), (0.0, 0.0, 1.0), 30.0, 96, 32)
+    clear = replace(plain(ONE, roughness=20), transmission=1.0)
+    slanted = Transform((0.0, -1.0, -0.5), (0.0, 0.0, 40.0), ONE)
+    red, blue = (0.6, 0.05, 0.05), (0.05, 0.05, 0.6)
+    posts = [
+        lambertian(block((width_m, 0.05, 2.0)), colour, at=replace(STILL, position_m=(x_m, 0.5, -0.5)))
+        for x_m, width_m, colour in ((0.0, 0.6, blue), (-0.42, 0.1, red), (0.42, 0.1, red))
+    ]
+    pane = Drawable(block((2.0, 0.6, 2.0)), slanted, (clear,), 1)
+    what = view(*posts, pane, ambient=0.5, camera=camera)
+    radiance = draw(renderer, replace(what, sky=Sky("procedural", (0.5, 0.5, 0.5)))).radiance
+    redness = radiance[..., 0] / radiance.sum(-1)
+    assert np.ptp(redness) > 0.5
+    steps = np.diff(redness, axis=1)
+    assert (-steps[:, :-1] * steps[:, 1:] < 0.05**2).all()
+
+
 def test_sampled_scenes_are_finite_and_without_fireflies(renderer: Renderer) -> None:
     """No pixel outshines the brightest of its 24 neighbours fifty times."""
     for seed in (21,):

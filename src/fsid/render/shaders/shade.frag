@@ -75,18 +75,22 @@ vec3 lights_on(Sample p, Reflector b, Blocks blocks, inout bool missing) {
 }
 
 #if GLASS
+// Depth in metres of what is behind at a place of the image, of one pixel: 0, where nothing was hit, is no depth to be
+// blended with others.
+float depth_behind(vec2 at) { return texelFetch(behind, clamp(ivec2(at), ivec2(0), size - 1), 0).a; }
+
 // What is seen through a slab of glass (index 1.5): the ray is moved sideways and goes on as before.
 vec3 seen_through(Sample p, Surface s, vec3 n, vec3 v) {
     vec3 inside = refract(-v, n, 1.0 / 1.5);
     float thick = s.thickness_m / max(-dot(inside, n), 0.3);
     vec3 local = axes * (p.position - origin);
     vec2 here = pixel_of(local);
-    float beyond = texture(behind, here / vec2(size)).a;
+    float beyond = depth_behind(here);
     float left = max(beyond > 0.0 ? beyond - local.z : 10.0, 0.0) / max(dot(axes[2], -v), 0.1);
-    vec2 there = pixel_of(axes * (p.position + inside * thick - v * left - origin));
-    vec4 moved = texture(behind, clamp(there / vec2(size), 0.5 / vec2(size), 1.0 - 0.5 / vec2(size)));
-    bool hidden = moved.a > 0.0 && moved.a < local.z;
-    return hidden ? texture(behind, here / vec2(size)).rgb : moved.rgb;
+    vec2 there = clamp(pixel_of(axes * (p.position + inside * thick - v * left - origin)), vec2(0.5), vec2(size) - 0.5);
+    float met = depth_behind(there);
+    bool hidden = met > 0.0 && met < local.z;
+    return texture(behind, (hidden ? here : there) / vec2(size)).rgb;
 }
 #endif
 
