@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fsid.assets import PART_KINDS, material_families, survey_skies
+from fsid.assets import PART_KINDS, material_families, mesh_sources, survey_skies
 from fsid.errors import FsidError
 from fsid.scene import BackgroundConfig, LightConfig, MaterialConfig, SceneConfig, sample
 from fsid.scene.colour import LUMINANCE
@@ -193,6 +193,15 @@ def test_a_folder_may_be_named_in_any_way(tmp_path: Path, monkeypatch: pytest.Mo
     assert all(drawn(place) == first for place in ("meshes", "meshes/", "./meshes", f"{folder}/"))
     monkeypatch.chdir(folder)
     assert drawn(".") == first
+
+
+def test_a_relative_folder_is_that_of_the_working_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    for place, name in (("one", "a"), ("two", "b")):
+        folder = tmp_path / place / "meshes"
+        folder.mkdir(parents=True)
+        (folder / f"{name}.obj").write_text(_TETRAHEDRON)
+        monkeypatch.chdir(tmp_path / place)
+        assert mesh_sources("meshes") == (f"file:meshes/{name}.obj",)
 
 
 def test_files_of_one_name_in_two_folders_are_all_drawn(tmp_path: Path):

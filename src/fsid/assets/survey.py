@@ -5,6 +5,7 @@ Surveying a large folder takes minutes, so a process does it once, and tells its
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
@@ -33,8 +34,11 @@ def surveyed(
 ) -> Survey[T]:
     """What `look()` finds to use and skips, the first time that `key` is asked for.
 
+    key: the kind, the place as it was given (names come from it; seen from another working folder it is
+    another one), and what else matters.
     FsidError, `nothing` and why the first was skipped, where there is none to use.
     """
+    key = (*key, os.path.abspath(key[1]))
     if key not in KNOWN:
         usable, skipped = look()
         if not usable:
