@@ -7,6 +7,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 import pytest
@@ -249,10 +250,10 @@ def test_an_unreadable_file_is_left_out_of_a_folder(
     for name in ("a", "b"):
         write_dng(folder / f"{name}.dng", noisy_raw())
 
-    def refused(path: Path) -> object:
+    def refused(file: BinaryIO, path: Path) -> object:
         if path.name == "a.dng":
             raise PermissionError(13, "Permission denied", str(path))
-        return read(path)
+        return read(file, path)
 
     monkeypatch.setattr("fsid.sensor.dng._read_source", refused)
     with pytest.raises(SystemExit) as stop:

@@ -400,10 +400,12 @@ def test_settings_that_say_nothing_are_named(settings: str, named: str, dataset:
 def test_levels_that_are_no_range_are_named(
     black: int, white: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    image = replace(raw(np.zeros((HEIGHT, WIDTH))), black_level=black, white_level=white)
     quantise = sys.modules["fsid.sensor.quantise"]
     monkeypatch.setattr(quantise, "check_levels", lambda *_: None)  # else it is not written
+    monkeypatch.setattr(Raw, "_check_levels", lambda _: None)
+    image = replace(raw(np.zeros((HEIGHT, WIDTH))), black_level=black, white_level=white)
     write_dataset(tmp_path, [image])
+    monkeypatch.undo()
     with pytest.raises(
         FsidError, match=rf"00000000\.clean\.dng: black level {black} and white level {white}"
     ):
