@@ -442,6 +442,24 @@ def test_a_run_that_was_killed_while_its_set_appeared_leaves_no_content(photos: 
     assert not list(out.rglob("iso800*"))
 
 
+@pytest.mark.parametrize("left", ['{"images": [{"name": "NAME"}]}', "[]", "{}", '{"images": 1}', "TESTSET"])
+def test_what_a_killed_run_is_said_to_have_left_elsewhere_stays(left: str, photos: Path, tmp_path: Path):
+    """The file may be anyone's: it names nothing outside the folder of the test set, and need not be one."""
+    out, part, other = tmp_path / "out", tmp_path / "out" / ".testset.part", tmp_path / "other"
+    photo_testset([photos], tmp_path / "good", camera="pixel6", isos=[800])
+    testset = (tmp_path / "good" / "testset.json").read_text(encoding="utf-8")
+    part.mkdir(parents=True)
+    other.mkdir()
+    for name in (str(other), "../other"):
+        text = testset.replace("0000-coffee-0", name) if left == "TESTSET" else left.replace("NAME", name)
+        (part / "testset.json").write_text(text, encoding="utf-8")
+        with staged(out) as root:
+            (root / "image").mkdir()
+        assert other.is_dir()
+        (out / "image").rmdir()
+        part.mkdir()
+
+
 def test_a_test_set_that_fails_leaves_a_folder_as_it_was(tmp_path: Path):
     for out in (tmp_path / "new", tmp_path / "there"):
         with pytest.raises(FsidError, match="/image/clean"), staged(out) as root:

@@ -265,13 +265,13 @@ def staged(out: Path) -> Iterator[Path]:
 
 
 def _left_by_a_killed_run(part: Path) -> list[Path]:
-    """What had been moved out of `part`, images of a set whose testset.json is still in it, and `part`."""
+    """`part`, and beside it the images that were moved out while testset.json, the last, was still in it."""
     try:
-        images = json.loads((part / TESTSET_FILE).read_text(encoding="utf-8"))["images"]
-        names = [image["name"] for image in images]
-    except (OSError, ValueError):
-        names = []
-    return [*(part.parent / name for name in names), part]
+        plain = json.loads((part / TESTSET_FILE).read_text(encoding="utf-8"))
+        names = {image.name for image in from_plain(TestSet, plain, source=str(part)).images}
+    except (OSError, ValueError, FsidError):
+        names = set()
+    return [path for path in part.parent.iterdir() if path == part or path.name in names]
 
 
 def _make(folder: Path) -> None:
