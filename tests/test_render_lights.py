@@ -261,33 +261,24 @@ def test_glass_bends_rays_at_a_slant(renderer: Renderer) -> None:
     assert abs(bright[0].mean() - bright[1].mean()) > 0.5
 
 
-def test_mirrored_glass_bends_rays_as_glass_does(renderer: Renderer) -> None:
-    """A scale below 0 mirrors a thing; a block that is alike on both sides looks as before."""
+@pytest.mark.parametrize(("height_m", "scale"), [(0.3, (-1.0, 1.0, 1.0)), (0.1, (1.0, 1.0, 3.0))])
+def test_scaled_glass_bends_rays_as_what_it_becomes(
+    renderer: Renderer, height_m: float, scale: tuple[float, float, float]
+) -> None:
+    """Mirrored, or stretched upwards: it looks as the block that is so from the start."""
     camera = Camera((0.6, -1.2, 0.9), (0.0, 0.0, 0.2), (0.0, 0.0, 1.0), 45.0, 64, 48)
     clear = replace(plain(ONE, roughness=20), transmission=1.0)
     stripe = lambertian(
         grid(0.1), (0.9, 0.1, 0.1), at=replace(STILL, position_m=(-0.1, 0.2, 0.001)), object_id=2
     )
     images = []
-    for scale in (ONE, (-1.0, 1.0, 1.0)):
-        glass = Drawable(block((0.5, 0.5, 0.3)), replace(STILL, scale=scale), (clear,), 1)
-        what = view(lambertian(grid(6.0)), stripe, glass, ambient=1.0, camera=camera)
-        images.append(draw(renderer, what).radiance)
-    np.testing.assert_allclose(images[1], images[0], atol=0.02)
-
-
-def test_glass_is_as_thick_as_its_scale_makes_it(renderer: Renderer) -> None:
-    """A low block that is stretched upwards looks as one that is as high from the start."""
-    camera = Camera((0.6, -1.2, 0.9), (0.0, 0.0, 0.2), (0.0, 0.0, 1.0), 45.0, 64, 48)
-    clear = replace(plain(ONE, roughness=20), transmission=1.0)
-    stripe = lambertian(
-        grid(0.1), (0.9, 0.1, 0.1), at=replace(STILL, position_m=(-0.1, 0.2, 0.001)), object_id=2
-    )
-    images = []
-    for height_m, scale in ((0.3, 1.0), (0.1, 3.0)):
-        at = replace(STILL, scale=(1.0, 1.0, scale))
-        glass = Drawable(block((0.5, 0.5, height_m)), at, (clear,), 1)
-        what = view(lambertian(grid(6.0)), stripe, glass, ambient=1.0, camera=camera)
+    for mesh, at in (
+        (block((0.5, 0.5, 0.3)), STILL),
+        (block((0.5, 0.5, height_m)), replace(STILL, scale=scale)),
+    ):
+        what = view(
+            lambertian(grid(6.0)), stripe, Drawable(mesh, at, (clear,), 1), ambient=1.0, camera=camera
+        )
         images.append(draw(renderer, what).radiance)
     np.testing.assert_allclose(images[1], images[0], atol=0.02)
 
