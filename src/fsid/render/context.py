@@ -20,11 +20,6 @@ import moderngl
 from fsid.errors import FsidError
 
 REQUIRED_VERSION = 430
-FORKED = (
-    "this process was forked from one that had used OpenGL, whose driver waits for threads that a fork does "
-    "not copy: start workers afresh (multiprocessing_context='spawn' of PyTorch's DataLoader), or use OpenGL "
-    "in them alone"
-)
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3
 _LARGE_BYTES, _KEPT_BYTES = 2**20, 2**26
 _MOST_BYTES, _ALL_BYTES = 2**25, 2**30  # glibc's largest threshold for large blocks; more than is ever free
@@ -104,7 +99,11 @@ _used_in: int | None = None  # the process that was the first to use OpenGL
 def check_not_forked() -> None:
     """FsidError in a child, by fork, of a process that has used OpenGL: the driver would wait for ever."""
     if _used_in not in (None, os.getpid()):
-        raise FsidError(FORKED)
+        raise FsidError(
+            "this process was forked from one that had used OpenGL, whose driver waits for threads that a "
+            "fork does not copy: start workers afresh (multiprocessing_context='spawn' of PyTorch's "
+            "DataLoader), or use OpenGL in them alone"
+        )
 
 
 def gl_info(context: moderngl.Context) -> GlInfo:
