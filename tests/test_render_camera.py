@@ -173,6 +173,8 @@ def test_flow_meets_the_same_point_in_the_other_image(renderer: Renderer, lens: 
     assert np.quantile(error, 0.95) < 0.05
     ball = a.object_id == 1
     assert np.linalg.norm(flow[ball], axis=-1).mean() > 5
+    in_two = (*first.drawables, first.drawables[1])  # as a lamp and its hood are
+    np.testing.assert_array_equal(flow_between(a, in_two, here, there, LABEL_SAMPLE), flow)
 
 
 def test_flow_of_a_still_camera_is_zero_and_nan_outside(renderer: Renderer) -> None:

@@ -10,7 +10,7 @@ import pytest
 
 import fsid.assets.skies
 import fsid.render.sky
-from fsid.assets import survey_skies
+from fsid.assets import Mesh, survey_skies
 from fsid.errors import FsidError
 from fsid.render import Frame, Renderer
 from fsid.render.drawable import Drawable, View, background_drawable, panel_drawable, view_of
@@ -156,6 +156,29 @@ def test_a_shining_surface_lights_its_neighbourhood(renderer: Renderer) -> None:
     np.testing.assert_allclose(frame.radiance[floor, 0], expected[floor], rtol=0.03)
     above = draw(renderer, view(lamp, camera=FROM_ABOVE))
     np.testing.assert_allclose(above.radiance[48, 48], 4.0, rtol=1e-3)
+
+
+def test_the_hood_of_a_lamp_shades_its_light(renderer: Renderer) -> None:
+    """A square of 0.6 m, 0.3 m below a bulb that is 1 m above the floor, shades a square of 2 m there; what
+    is translucent shades nothing of its own bulb."""
+    bulb, square = sphere(0.1), grid(0.6)
+    mesh = Mesh(
+        vertices=np.concatenate([bulb.vertices, square.vertices - np.float32([0, 0, 0.3])]),
+        normals=np.concatenate([bulb.normals, square.normals]),
+        faces=np.concatenate([square.faces + len(bulb.vertices), bulb.faces]).astype(np.int32),
+        face_parts=np.repeat(np.int32([1, 0]), [len(square.faces), len(bulb.faces)]),
+        part_names=("bulb", "hood"),
+    )
+    glowing, at = replace(plain((0.8, 0.8, 0.8)), emission=5.0), Transform((0.0, 0.0, 1.0), (0, 0, 0), ONE)
+    camera = replace(FROM_ABOVE, position_m=(1.5, 0.0, 1.2), target_m=(0.9, 0.0, 0.0))
+    radiance = {}
+    for hood in (plain(), replace(plain(), translucency=0.5)):
+        lamp = Drawable(mesh, at, (glowing, hood), 1, specular=0.0)
+        frame = draw(renderer, view(lambertian(grid(8.0)), lamp, camera=camera))
+        radiance[hood.translucency] = frame.radiance[..., 0]
+    share, aside = radiance[0.0] / radiance[0.5], np.abs(floor_points(camera)[..., :2]).max(-1)
+    assert (share[aside < 0.7] < 0.01).all()
+    np.testing.assert_allclose(share[aside > 1.3], 1.0, atol=0.01)
 
 
 def test_a_grey_sky_is_a_furnace(renderer: Renderer) -> None:

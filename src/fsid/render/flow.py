@@ -41,9 +41,10 @@ def flow_between(
     depth = np.where(hit, frame.depth, 1.0).astype(float)
     local = np.stack([rays[..., 0] * depth, -rays[..., 1] * depth, depth], axis=-1)
     points = local @ lens.rotation + lens.position
-    for drawable in drawables:
+    objects = {drawable.object_id: drawable for drawable in drawables}  # of one object alike
+    for number, drawable in objects.items():
         if drawable.motion != UNMOVED and time_s != other_time_s:
-            own = frame.object_id == drawable.object_id
+            own = frame.object_id == number
             points[own] = _moved(drawable, points[own], time_s, other_time_s)
     local = (points - other_lens.position) @ other_lens.rotation.T
     hit &= local[..., 2] > 1e-6

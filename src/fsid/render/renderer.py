@@ -40,6 +40,7 @@ from fsid.render.exposure import Shot, is_moving, shots_of
 from fsid.render.flow import flow_between
 from fsid.render.frame import Frame
 from fsid.render.fringes import inside, magnified, with_margin
+from fsid.render.lamps import hoods_apart
 from fsid.render.layers import GPU_BUDGET_BYTES, Layer, LayerStore, fitting_size
 from fsid.render.mip_levels import MipLevels
 from fsid.render.mirror import MOST, Mirror, clearest_mirror, ground_mirror
@@ -207,7 +208,7 @@ class Renderer:
             raise FsidError("a Renderer works in the thread that opened it; open and use it in one thread")
         asked = view.camera
         camera, margin = with_margin(asked)
-        view = replace(view, camera=camera)
+        view = replace(view, camera=camera, drawables=hoods_apart(view.drawables))
         shot = Shot(lens_of(camera), camera.time_s, shift_px)
         bake = bake or self._bake
         self._draw(view, shot, bake, mark)
