@@ -143,7 +143,9 @@ def sheet(names: Sequence[tuple[str, int]], columns: int) -> Image.Image:
 
 
 def main(arguments: Sequence[str]) -> None:
-    if arguments[:1] == ["sheet"]:
+    if arguments and (arguments[0] != "sheet" or len(arguments) < 2):
+        sys.exit(__doc__)
+    if arguments:
         families = tuple(arguments[2:]) or material_families()
         pairs = [(family, variant) for family in families for variant in range(MATERIAL_VARIANTS)]
         sheet(pairs, 8).save(arguments[1])

@@ -110,7 +110,9 @@ def sheet(families: Sequence[str], seeds: Sequence[int], columns: int, size: int
 
 
 def main(arguments: Sequence[str]) -> None:
-    if arguments[:1] == ["sheet"]:
+    if arguments and (arguments[0] != "sheet" or len(arguments) < 2):
+        sys.exit(__doc__)
+    if arguments:
         families = tuple(arguments[2:]) or mesh_families()
         sheet(families, range(SEEDS), SEEDS, 200).save(arguments[1])
         return
