@@ -262,6 +262,35 @@ def test_a_small_thing_that_moves_leaves_no_ghosts(renderer: Renderer) -> None:
     assert row.max() < 1.4 * row.min()
 
 
+@pytest.mark.parametrize("turns", ["the thing", "the camera"])
+def test_what_turns_once_leaves_a_disc(renderer: Renderer, turns: str) -> None:
+    """A bar that ends where it began has been everywhere between: alike all around."""
+    bar = lambertian(block((0.6, 0.08, 0.02)), (0.9, 0.9, 0.9), object_id=1)
+    spin = (0.0, 0.0, 720.0)
+    camera = replace(FROM_ABOVE, width=64, height=64, exposure_s=0.5)
+    if turns == "the thing":
+        bar = replace(bar, motion=Motion(spin_deg_s=spin))
+    else:
+        camera = replace(camera, spin_deg_s=spin)
+    image = draw(renderer, view(bar, ambient=1.0, camera=camera)).radiance[..., 0]
+    angle, radius_px = np.linspace(0, 2 * np.pi, 60), 0.22 * 16 / np.tan(np.radians(30))
+    around = map_coordinates(image, 31.5 + radius_px * np.stack([np.sin(angle), np.cos(angle)]), order=1)
+    assert around.max() < 1.3 * around.min()
+
+
+def test_what_comes_into_the_picture_late_leaves_no_ghosts(renderer: Renderer) -> None:
+    """A ball that the middle of the exposure does not show is a line from where it was at the start."""
+    ball = lambertian(sphere(0.06, 24), (0.9, 0.9, 0.9), at(1.4, 0.0, 0.3), object_id=1)
+    ball = replace(ball, motion=Motion(velocity_m_s=(-10.0, 0.0, 0.0)))
+    camera = replace(FROM_ABOVE, width=96, height=32, exposure_s=0.2)
+    what = view(lambertian(grid(8.0), (0.1, 0.1, 0.1)), ball, ambient=1.0, camera=camera)
+    frame = draw(renderer, what)
+    assert (frame.object_id == 0).all()
+    row = frame.radiance[15, 72:90, 0]
+    assert row.min() > 0.11
+    assert row.max() < 1.4 * row.min()
+
+
 def test_a_camera_that_makes_no_sense_is_named() -> None:
     for change in ({"focus_m": 0.0}, {"aperture_m": -1.0}, {"exposure_s": -1.0}):
         with pytest.raises(FsidError, match=r"scene\.cameras"):

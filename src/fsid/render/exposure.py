@@ -11,11 +11,12 @@ whose blur its image is given (`fsid.render.defocus`): few places are enough, an
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise, product
 
 import numpy as np
 
-from fsid.render.camera import Lens, lens_of
+from fsid.render.camera import NEAR_M, Lens, lens_of
 from fsid.render.drawable import UNMOVED, Drawable
 from fsid.render.flow import flow_between
 from fsid.render.frame import Frame
@@ -25,6 +26,10 @@ from fsid.scene.model import ZERO, Camera
 STEP_PX = 1.5
 LENS_STEP_PX = 4.0
 _FEWEST = 4
+_STRAIGHT_DEG = 30.0
+"""What turns by less is measured as if it moved straight on."""
+_MOST_PARTS = 32
+"""Of the exposure, in which paths are followed."""
 _TIME_STEP = (
     0.7320508  # of the exposure; the golden ratio is what the spiral turns by, and would go around once
 )
@@ -70,7 +75,7 @@ def shots_of(
         across = _blur_px(camera, middle.lens, frame) / LENS_STEP_PX
         count = min(round(np.pi / 4 * across * across) + 1, most_places)
     if moving:
-        steps = round(_motion_px(camera, drawables, frame, sample) / STEP_PX) + 1
+        steps = round(_motion_px(camera, drawables, frame, sample, most * STEP_PX) / STEP_PX) + 1
         count = int(np.clip(max(count, steps), _FEWEST, most))
     if count == 0:
         return []
@@ -97,18 +102,52 @@ def is_moving(camera: Camera, drawables: Sequence[Drawable]) -> bool:
     )
 
 
-def _motion_px(camera: Camera, drawables: Sequence[Drawable], frame: Frame, sample: float) -> float:
-    """How far the fastest thing in the image moves during the exposure, be it small."""
-    start, end = (camera.time_s + side * camera.exposure_s / 2 for side in (-1, 1))
+def _motion_px(
+    camera: Camera, drawables: Sequence[Drawable], frame: Frame, sample: float, enough_px: float
+) -> float:
+    """How far the fastest thing moves in the image during the exposure, be it small: along its path, which
+    may lead back to where it began. What is more than `enough_px` need not be exact."""
+    moving = [drawable for drawable in drawables if drawable.motion != UNMOVED]
+    spins = [camera.spin_deg_s, *(drawable.motion.spin_deg_s for drawable in moving)]
+    turn_deg = float(np.linalg.norm(spins, axis=1).max()) * camera.exposure_s
     middle = (camera, lens_of(camera), camera.time_s)
-    paths = [
-        flow_between(frame, drawables, middle, (camera, lens_of(camera, time), time), sample)
-        for time in (start, end)
-    ]
-    length = np.linalg.norm(paths[1] - paths[0], axis=-1)
-    moving = [drawable.object_id for drawable in drawables if drawable.motion != UNMOVED]
-    lengths = [length, *(length[frame.object_id == number] for number in moving)]
+    flows = (
+        flow_between(frame, drawables, middle, (camera, lens_of(camera, time_s), time_s), sample)
+        for time_s in _times(camera, min(1 + int(turn_deg / _STRAIGHT_DEG), _MOST_PARTS))
+    )
+    length = np.zeros(frame.depth.shape, np.float32)
+    for before, after in pairwise(flows):
+        length += np.linalg.norm(after - before, axis=-1)
+        if np.isfinite(length).any() and np.nanquantile(length, 0.999) > enough_px:
+            break
+    lengths = [length]
+    for drawable in moving:
+        own = length[frame.object_id == drawable.object_id]
+        lengths.append(own if np.isfinite(own).any() else _unseen_motion_px(camera, drawable))
     return max((float(np.nanquantile(own, 0.999)) for own in lengths if np.isfinite(own).any()), default=0.0)
+
+
+def _unseen_motion_px(camera: Camera, drawable: Drawable) -> np.ndarray:
+    """How far the corners of a thing's box would move at the speed that they have at each time, NaN where the
+    picture does not reach: of a thing that the middle of the exposure does not show."""
+    vertices = drawable.mesh.vertices * np.array(drawable.transform.scale)
+    corners = np.array(list(product(*zip(vertices.min(0), vertices.max(0), strict=True))))
+    reach, pinhole = 1 / np.array(lens_of(camera).seen_focal), replace(camera, distortion=None)
+    places = []
+    for time_s in _times(camera, _MOST_PARTS):
+        lens, (rotation, position) = lens_of(pinhole, time_s), drawable.pose(time_s)
+        local = (corners @ rotation.T + position - lens.position) @ lens.rotation.T
+        local[local[:, 2] < NEAR_M] = np.nan
+        image = local[:, :2] / local[:, 2:]
+        inside = (np.fmin.reduce(image) < reach) & (np.fmax.reduce(image) > -reach)
+        half_px = np.array(lens.focal) * (camera.width / 2, camera.height / 2)
+        places.append(np.where(inside.all(), image * half_px, np.nan))
+    return np.asarray(np.linalg.norm(np.diff(places, axis=0), axis=-1) * _MOST_PARTS)
+
+
+def _times(camera: Camera, parts: int) -> np.ndarray:
+    """(parts + 1,) from the start to the end of the exposure, seconds."""
+    return np.asarray(camera.time_s + camera.exposure_s * np.linspace(-0.5, 0.5, parts + 1))
 
 
 def _blur_px(camera: Camera, lens: Lens, frame: Frame) -> float:
