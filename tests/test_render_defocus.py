@@ -11,8 +11,9 @@ from fsid.errors import FsidError
 from fsid.render import Renderer
 from fsid.render.camera import lens_of
 from fsid.render.defocus import defocus
-from fsid.scene.model import Transform
-from render_scenes import FROM_ABOVE, bake_plain, grid, lambertian, sphere, view
+from fsid.scene.distortion import distorted
+from fsid.scene.model import Distortion, Transform
+from render_scenes import FROM_ABOVE, bake_plain, grid, lambertian, plain, sphere, view
 
 FOCUS_M, FOCAL_PX = 2.0, 400.0
 
@@ -79,6 +80,28 @@ def test_depth_of_field_blurs_by_the_circle_of_confusion(images: int) -> None:
             diameter = aperture * (96 / np.tan(np.radians(30))) * abs(1 / 2.0 - 1 / (2.0 - height))
             assert abs((high - low) - 0.687 * diameter) < 0.25 * 0.687 * diameter + 1.0
             assert np.diff(row).min() > -0.01
+
+
+@pytest.mark.parametrize("images", [1, 24])
+def test_a_lens_bends_the_circle_of_confusion_with_the_image(images: int) -> None:
+    """In the corner of a fisheye's image it is as small as all is there: its area is the determinant of the
+    lens's formula times that of the disc that a pinhole's lens would show."""
+    fisheye = Distortion("fisheye", (0.05, -0.01, 0.002, 0.0))
+    sharp = replace(FROM_ABOVE, width=192, height=128, fov_deg=90.0, distortion=fisheye, focus_m=8.0)
+    opened, place, step = replace(sharp, aperture_m=0.24), np.array([1.7, 1.2]), 1e-4
+    shining = replace(plain((0.5, 0.5, 0.5)), emission=1.0)
+    spot = replace(lambertian(grid(0.1), at=at(*place, 0.0)), materials=(shining,))
+    with Renderer(texture_size=64, lens_images=images) as renderer:
+        spots = [
+            renderer.draw(view(spot, camera=c), bake=bake_plain).radiance[..., 1] for c in (sharp, opened)
+        ]
+    y, x = np.mgrid[:128, :192]
+    before, after = (np.cov(np.stack([x.ravel(), y.ravel()]), aweights=light.ravel()) for light in spots)
+    moved = np.array([[0, 0], [step, 0], [0, step]]) + place / 2
+    shown = distorted(fisheye, moved)
+    stretch2 = np.linalg.det(shown[1:] - shown[0]) / step**2
+    diameter_px = 0.24 * lens_of(sharp).focal[0] * 96 * (1 / 2.0 - 1 / 8.0)
+    assert np.sqrt(np.linalg.det(after - before)) == pytest.approx(diameter_px**2 / 16 * stretch2, rel=0.12)
 
 
 def test_one_image_comes_near_to_many() -> None:

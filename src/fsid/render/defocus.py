@@ -32,14 +32,19 @@ _STRIP = 1 << 15  # values: rows of it stay in the cache with what they are made
 
 
 def defocus(
-    radiance: np.ndarray, depth: np.ndarray, aperture_m: float, focus_m: float, focal_px: float
+    radiance: np.ndarray,
+    depth: np.ndarray,
+    aperture_m: float,
+    focus_m: float,
+    focal_px: float | np.ndarray,
 ) -> np.ndarray:
     """A sharp image, radiance (H, W, 3) and depth (H, W) in metres, as a lens opening shows it; float32.
 
-    aperture_m: diameter of the opening. focus_m: depth of the sharp plane. focal_px: focal length in pixels.
+    aperture_m: diameter of the opening. focus_m: depth of the sharp plane. focal_px: focal length in
+    pixels; (H, W) where a lens that bends the image shows some of it larger.
     """
     depth = minimum_filter(depth, 3)  # pixels that an edge divides belong to its near side
-    blur = (1 / depth - np.float32(1 / focus_m)) * np.float32(aperture_m * focal_px / 4)
+    blur = (1 / depth - np.float32(1 / focus_m)) * np.asarray(aperture_m * focal_px / 4, np.float32)
     place = np.interp(blur**2, _SIGMA_PX**2, np.arange(len(_SIGMA_PX))).astype(np.float32)
     np.copysign(place, blur, out=place)  # above 0 before the sharp plane
     del blur

@@ -55,6 +55,7 @@ from fsid.render.stage import Stage, stage_of
 from fsid.render.targets import Targets
 from fsid.render.texels import Bake, Texels, bake_texels
 from fsid.scene.check import camera_of
+from fsid.scene.distortion import stretch_of
 from fsid.scene.model import ZERO, Camera, Scene
 
 Mark = Callable[[str], None]
@@ -327,5 +328,7 @@ def _through_lens(shot: Shot, camera: Camera, radiance: np.ndarray, depth: np.nd
     """An image as the part of the lens that `shot` stands for shows it."""
     if shot.aperture_m == 0:
         return radiance
-    focal_px = shot.lens.focal[0] * camera.width / 2
+    focal_px: float | np.ndarray = shot.lens.focal[0] * camera.width / 2
+    if camera.distortion is not None:
+        focal_px = focal_px * stretch_of(camera.distortion, camera)
     return defocus(radiance, depth, shot.aperture_m, camera.focus_m, focal_px)

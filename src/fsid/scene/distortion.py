@@ -139,3 +139,23 @@ def rays_of(distortion: Distortion, camera: Camera) -> tuple[np.ndarray, np.ndar
     if half.max() > _WIDEST_TANGENT:
         raise _not_invertible()
     return image, rays, half
+
+
+def stretch_of(distortion: Distortion, camera: Camera) -> np.ndarray:
+    """(H, W) float32: how much longer the lens shows a short line around each pixel than a pinhole would, the
+    geometric mean along and across. FsidError as `rays_of`."""
+    image, rays, _ = rays_of(distortion, camera)
+    shown, straight = (
+        np.linalg.det(np.stack(np.gradient(points, axis=(1, 0)), axis=-1)) for points in (image, rays)
+    )
+    width, height = camera.width, camera.height
+    focal_x, focal_y = focal_of(camera)
+    rows = _between_lines(image[:, 0, 1], ((np.arange(height) + 0.5) / height * 2 - 1) / focal_y)
+    columns = _between_lines(image[0, :, 0], ((np.arange(width) + 0.5) / width * 2 - 1) / focal_x)
+    return (rows @ np.sqrt(shown / straight) @ columns.T).astype(np.float32)
+
+
+def _between_lines(lines: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """(P, N) shares of N ascending lines in what is interpolated at P places between them."""
+    at = np.interp(places, lines, np.arange(len(lines)))
+    return np.maximum(1 - np.abs(at[:, None] - np.arange(len(lines))), 0.0)
