@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import errno
+import io
+import tarfile
 from pathlib import Path
 
 import pytest
 
 from fsid.dataset import read_member, shard_keys, shard_path, write_shard
-from fsid.dataset.shards import find_shards
+from fsid.dataset.shards import find_shards, read_samples
 from fsid.errors import FsidError
 
 
@@ -62,3 +64,47 @@ def test_a_truncated_shard_is_named(tmp_path: Path):
     path.write_bytes(b"not a tar")
     with pytest.raises(FsidError, match=r"x\.tar"):
         shard_keys(path)
+
+
+def _member(name: str, kind: bytes, link: str = "", data: bytes = b"", size: int | None = None) -> bytes:
+    """A header as old GNU tar writes it, and what follows it."""
+    member = tarfile.TarInfo(name)
+    member.type, member.linkname, member.size = kind, link, len(data)
+    head = bytearray(member.tobuf(tarfile.GNU_FORMAT))
+    if size is not None:  # of a sparse file, holes included
+        head[483:495] = b"\x80" + size.to_bytes(11, "big")
+        head[148:156] = b" " * 8
+        head[148:156] = b"%06o\0 " % sum(head)
+    return bytes(head) + data.ljust(-(-len(data) // 512) * 512, b"\0")
+
+
+@pytest.mark.parametrize(
+    ("first", "reads"),
+    [
+        (_member("b.json", tarfile.SYMTYPE, "b.json"), True),
+        (_member("b.json", tarfile.SYMTYPE, "/etc/passwd"), True),
+        (_member("b.json", tarfile.LNKTYPE, "b.json"), True),
+        (_member("b.json", tarfile.FIFOTYPE), True),
+        (_member("b.json", tarfile.GNUTYPE_SPARSE, size=200 << 30), True),
+        (_member("p", tarfile.XHDTYPE, data=b"12 path=aaa\n") * 3000, False),
+        (_member("p", tarfile.XHDTYPE, data=b"31 size=9999999999999999999999\n"), False),
+        (_member("p", tarfile.XHDTYPE, data=b"9999999999999999999999 size=9\n"), False),
+        (_member("p", tarfile.XHDTYPE, data=b"22 GNU.sparse.map=0,x\n"), False),
+    ],
+)
+def test_a_strangers_shard_is_read_or_named(tmp_path: Path, first: bytes, reads: bool):
+    """What links or states sizes is no file of a sample; numbers that cannot be are one line."""
+    whole = io.BytesIO()
+    with tarfile.open(fileobj=whole, mode="w") as tar:
+        member = tarfile.TarInfo("a.json")
+        member.size = 2
+        tar.addfile(member, io.BytesIO(b"{}"))
+    path = shard_path(tmp_path, 0)
+    path.write_bytes(first + whole.getvalue())
+    if reads:
+        assert read_samples(path) == {"a": {"json": b"{}"}}
+        assert shard_keys(path) == ["a"]
+        return
+    for read in (read_samples, shard_keys):
+        with pytest.raises(FsidError, match=r"shard-00000\.tar: is not a readable shard"):
+            read(path)

@@ -1,14 +1,23 @@
 """A file appears whole or not at all, and nothing lies beside it afterwards."""
 
 import errno
+import os
+import signal
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 import pytest
 
-from fsid.dataset import grid, save_png, to_uint8
+from fsid.config import read_json, read_yaml
+from fsid.dataset import grid, save_png, shard_keys, to_uint8
+from fsid.dataset.photos import read_photo
+from fsid.dataset.pictures import read_exr
 from fsid.errors import FsidError
+from fsid.evaluate.testset import TESTSET_FILE, read_testset
 from fsid.files import write_atomically, write_together
+from fsid.sensor import load_profile
 
 
 def test_a_file_is_replaced_whole(tmp_path: Path) -> None:
@@ -85,3 +94,51 @@ def test_a_place_that_is_no_folder_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(FsidError, match="cannot be written"):
         write_atomically(tmp_path / "file" / "a", b"new")
+
+
+@pytest.fixture
+def patience() -> Iterator[None]:
+    def too_long(*_: object) -> NoReturn:
+        raise TimeoutError
+
+    before = signal.signal(signal.SIGALRM, too_long)
+    signal.alarm(10)
+    yield
+    signal.alarm(0)
+    signal.signal(signal.SIGALRM, before)
+
+
+def _zeros(path: Path) -> None:
+    path.symlink_to("/dev/zero")
+
+
+def _holes(path: Path) -> None:
+    """100 GB that take no place."""
+    path.touch()
+    os.truncate(path, 100 << 30)
+
+
+@pytest.mark.usefixtures("patience")
+@pytest.mark.parametrize("make", [os.mkfifo, _zeros, _holes, Path.mkdir])
+@pytest.mark.parametrize(
+    ("name", "read"),
+    [
+        ("a.yaml", read_yaml),
+        ("a.json", read_json),
+        ("a.yaml", load_profile),
+        (TESTSET_FILE, lambda path: read_testset(path.parent)),
+        ("a.png", read_photo),
+        ("a.exr", read_exr),
+        ("shard-00000.tar", shard_keys),
+    ],
+)
+def test_no_reader_waits_for_what_has_no_end(
+    tmp_path: Path, make: Callable[[Path], None], name: str, read: Callable[[Path], object]
+) -> None:
+    """A pipe that nobody writes to, a device, a file of holes, a folder: as a stranger's archive may hold."""
+    make(tmp_path / name)
+    if make is _holes and name.endswith(".tar"):  # zeros are the end of a tar
+        assert read(tmp_path / name) == []
+        return
+    with pytest.raises(FsidError, match=name):
+        read(tmp_path / name)

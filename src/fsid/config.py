@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib.resources import as_file, files
@@ -22,7 +23,7 @@ import numpy as np
 import yaml
 
 from fsid.errors import FsidError
-from fsid.files import write_atomically
+from fsid.files import read_whole, write_atomically
 
 T = TypeVar("T")
 Override = str | tuple[str, Any]
@@ -146,9 +147,7 @@ def _first_refusal(error: BaseException) -> FsidError | None:
 def read_yaml(file: Path) -> dict[str, Any]:
     """A YAML mapping, loaded safely; FsidError where it is missing, broken or something else."""
     try:
-        text = file.read_text(encoding="utf-8")
-    except OSError as error:
-        raise FsidError(f"{file}: cannot be read ({error.strerror})") from None
+        text = read_whole(file).decode()
     except UnicodeDecodeError as error:
         raise FsidError(f"{file}: is not valid YAML ({error})") from None
     plain = parse_yaml(text, str(file))
@@ -157,6 +156,19 @@ def read_yaml(file: Path) -> dict[str, Any]:
     if not isinstance(plain, dict):
         raise FsidError(f"{file}: expected 'key: value' lines, found {type(plain).__name__}")
     return plain
+
+
+def read_json(file: Path) -> Any:
+    """What a JSON file holds; FsidError where it is missing or broken."""
+    return parse_json(read_whole(file), str(file))
+
+
+def parse_json(data: bytes, source: str) -> Any:
+    """What JSON in UTF-8, 16 or 32 holds; FsidError, naming `source`, where it is broken."""
+    try:
+        return json.loads(data)
+    except (ValueError, RecursionError) as error:
+        raise FsidError(f"{source}: is not valid JSON ({error})") from None
 
 
 def load_settings(

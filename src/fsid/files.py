@@ -17,6 +17,30 @@ def paths_of(paths: str | Path | Iterable[str | Path]) -> list[Path]:
     return [Path(paths)] if isinstance(paths, str | Path) else [Path(path) for path in paths]
 
 
+MOST_BYTES = 1 << 26
+"""Of settings, cards and records, the largest of which are a few megabytes."""
+
+
+def read_whole(path: Path, most_bytes: int = MOST_BYTES) -> bytes:
+    """The content of a file of at most so many bytes. FsidError where it is larger or cannot be read."""
+    check_file(path)
+    try:
+        with path.open("rb") as file:
+            if os.fstat(file.fileno()).st_size > most_bytes:
+                raise FsidError(
+                    f"{path}: is more than {most_bytes >> 20} MiB, too large for what it should be"
+                )
+            return file.read()
+    except OSError as error:
+        raise FsidError(f"{path}: cannot be read ({error.strerror})") from None
+
+
+def check_file(path: Path) -> None:
+    """FsidError where `path` is there and no file: a pipe may stay silent, and a device has no end."""
+    if path.exists() and not path.is_file():
+        raise FsidError(f"{path}: cannot be read (it is no file)")
+
+
 def write_atomically(path: Path, data: bytes) -> None:
     """Replace `path` by `data`, or leave it as it was. FsidError where the disk refuses."""
     write_together({path: data})

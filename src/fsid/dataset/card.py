@@ -33,6 +33,7 @@ _FAMILIES_SHOWN = 200
 _MEASURED = 64
 """Images whose statistics the card states; `fsid inspect` measures more."""
 _SMALLEST_PX = 128
+_LICENCE_LETTERS = 20_000
 
 
 @dataclass
@@ -172,7 +173,8 @@ def _folder_licence(folder: Path) -> str:
         if place.is_dir():
             for file in sorted(place.iterdir()):
                 if file.is_file() and file.stem.lower() in ("license", "licence", "copying"):
-                    first = file.read_text(encoding="utf-8", errors="replace").strip().partition("\n")[0]
+                    with file.open(encoding="utf-8", errors="replace") as text:
+                        first = text.read(_LICENCE_LETTERS).strip().partition("\n")[0]
                     return f"`{file.name}`: {first[:200]}"
     return "No licence file was found with them: look at their source before you publish."
 

@@ -23,8 +23,9 @@ import tifffile
 from fsid.config import from_plain, read_yaml
 from fsid.dataset.attempt import SAMPLE_KEY
 from fsid.dataset.config import DatasetConfig, split_of
-from fsid.dataset.shards import find_shards, read_files, read_record
+from fsid.dataset.shards import find_shards, open_shard, read_files, read_record
 from fsid.errors import FsidError
+from fsid.files import read_whole
 from fsid.sensor import dng_tags
 from fsid.sensor.mosaic import check_cfa
 from fsid.sensor.quantise import check_levels
@@ -98,7 +99,7 @@ def identity(data_dir: Path) -> str:
     """
     file = data_dir / "config.yaml"
     if file.exists():
-        return hashlib.sha256(file.read_bytes()).hexdigest()
+        return hashlib.sha256(read_whole(file)).hexdigest()
     first = next(m for shard in find_shards(data_dir) for m in _index_shard(shard, ".clean.dng"))
     return hashlib.sha256(first.levels().tobytes()).hexdigest()
 
@@ -169,13 +170,8 @@ def _stated_origin(data: bytes, where: str) -> tuple[str, str]:
 
 
 def _index_shard(shard: Path, suffix: str) -> list[StoredMosaic]:
-    try:
-        with tarfile.open(shard, "r:") as tar:
-            members = [m for m in tar if m.isfile() and m.name.endswith(suffix)]
-    except (OSError, tarfile.TarError) as error:
-        raise FsidError(
-            f"{shard}: is not a readable tar file ({error}); delete it and generate again"
-        ) from None
+    with open_shard(shard) as (_, plain):
+        members = [member for member in plain if member.name.endswith(suffix)]
     return [_read_header(shard, m, m.name.removesuffix(suffix)) for m in members]
 
 

@@ -14,7 +14,7 @@ from fsid.dataset.sample import encode, make_sample, remake
 from fsid.dataset.shards import read_record, read_records, shard_path
 from fsid.dataset.worker import rendering
 from fsid.errors import FsidError
-from fsid.files import write_atomically
+from fsid.files import read_whole, write_atomically
 
 
 def make_only(
@@ -44,11 +44,7 @@ def make_only(
 
 
 def _from_json(file: Path) -> Sample:
-    try:
-        data = file.read_bytes()
-    except OSError as error:
-        raise FsidError(f"{file}: cannot be read ({error.strerror})") from None
-    return _remake(read_record(data, str(file)), str(file))
+    return _remake(read_record(read_whole(file), str(file)), str(file))
 
 
 def _from_key(

@@ -11,6 +11,7 @@ import numpy as np
 from PIL import ExifTags, Image, ImageCms
 
 from fsid.errors import FsidError
+from fsid.files import check_file
 from fsid.sensor import upright
 
 SMALLEST_PX = 32
@@ -72,6 +73,7 @@ def check_photo(path: str | Path) -> None:
 
 def _read(path: str | Path, shrink: int = 1) -> np.ndarray:
     """As `read_photo`; a JPEG `shrink` times smaller, which its decoder does quickly."""
+    check_file(Path(path))
     try:
         with Image.open(path, formats=_FORMATS) as image:
             width, height = image.size

@@ -25,6 +25,7 @@ from fsid.dataset.photos import (
     read_photo,
 )
 from fsid.errors import FsidError
+from fsid.files import check_file
 
 EXR_SUFFIX = ".exr"
 _SRGB_CHROMATICITIES = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
@@ -116,6 +117,7 @@ def read_exr(path: Path) -> np.ndarray:
     """
     import OpenEXR
 
+    check_file(path)
     try:
         with OpenEXR.File(str(path), header_only=True) as file:  # before anything is decoded
             sizes = [stated_size(part.header) for part in file.parts]

@@ -8,7 +8,6 @@ constant (time 0, owner 0), so equal samples give equal shards, and of two write
 from __future__ import annotations
 
 import io
-import json
 import os
 import re
 import socket
@@ -19,7 +18,9 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+from fsid.config import parse_json
 from fsid.errors import FsidError
+from fsid.files import check_file
 
 
 def shard_path(folder: str | Path, number: int) -> Path:
@@ -97,14 +98,11 @@ def count_whole(path: str | Path) -> int:
 
 def read_member(path: str | Path, name: str) -> bytes:
     """One file of a shard, for example `00000000.json`."""
-    try:
-        with tarfile.open(path, "r:") as tar:
-            file = tar.extractfile(name)
-            if file is None:
-                raise KeyError(name)
-            return file.read()
-    except (OSError, tarfile.TarError, KeyError):
-        raise FsidError(f"{path}: has no readable member {name}") from None
+    with open_shard(Path(path)) as (tar, members):
+        found = [member for member in members if member.name == name]
+        if not found:
+            raise FsidError(f"{path}: has no readable member {name}")
+        return _content(tar, found[-1])
 
 
 def read_samples(path: Path) -> dict[str, dict[str, bytes]]:
@@ -118,10 +116,7 @@ def read_samples(path: Path) -> dict[str, dict[str, bytes]]:
 
 def read_record(data: bytes, where: str) -> dict[str, Any]:
     """The content of a sample's JSON. FsidError, naming `where`, unless it is JSON of keys with values."""
-    try:
-        record = json.loads(data)
-    except (ValueError, RecursionError) as error:
-        raise FsidError(f"{where}: is not valid JSON ({error})") from None
+    record = parse_json(data, where)
     if not isinstance(record, dict):
         raise FsidError(f"{where}: is not the JSON of a sample; expected keys with values")
     return record
@@ -135,22 +130,35 @@ def read_records(path: Path) -> Iterator[dict[str, Any]]:
 
 def read_files(path: Path, suffix: str = "") -> Iterator[tuple[str, bytes]]:
     """Name and content of the files of a shard whose names end so. FsidError where it is not readable."""
+    with open_shard(path) as (tar, members):
+        for member in members:
+            if member.name.endswith(suffix):
+                yield member.name, _content(tar, member)
+
+
+@contextmanager
+def open_shard(path: Path) -> Iterator[tuple[tarfile.TarFile, Iterator[tarfile.TarInfo]]]:
+    """A tar and its plain files, in order. FsidError where it is not readable.
+
+    Links and sparse files, which may name each other or state any size, are none that FSID writes.
+    """
+    check_file(path)
     try:
         with tarfile.open(path, "r:") as tar:
-            for member in tar:
-                file = tar.extractfile(member) if member.name.endswith(suffix) else None
-                if file is not None:
-                    yield member.name, file.read()
-    except (OSError, tarfile.TarError) as error:
+            yield tar, (member for member in tar if member.isreg() and not member.issparse())
+    except (OSError, tarfile.TarError, ValueError, OverflowError, RecursionError) as error:
         raise FsidError(f"{path}: is not a readable shard ({error}); delete it and generate again") from None
+
+
+def _content(tar: tarfile.TarFile, member: tarfile.TarInfo) -> bytes:
+    file = tar.extractfile(member)
+    assert file is not None
+    return file.read()
 
 
 def _members(path: str | Path) -> list[str]:
-    try:
-        with tarfile.open(path, "r:") as tar:
-            return tar.getnames()
-    except (OSError, tarfile.TarError) as error:
-        raise FsidError(f"{path}: is not a readable shard ({error}); delete it and generate again") from None
+    with open_shard(Path(path)) as (_, members):
+        return [member.name for member in members]
 
 
 @contextmanager

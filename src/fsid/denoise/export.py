@@ -5,7 +5,6 @@ Each is checked before it is written: an .onnx file against PyTorch, a smaller p
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -13,6 +12,7 @@ from typing import Literal
 import numpy as np
 import torch
 
+from fsid.config import read_json
 from fsid.denoise.denoise import Network, denoise_raw
 from fsid.denoise.model import Denoiser, load_denoiser, model_path, save_model
 from fsid.denoise.onnx_denoiser import onnx_denoiser
@@ -120,6 +120,6 @@ def _safetensors(
 def _sessions_of(model: Path) -> list[object]:
     """The sessions in the card beside a network that was exported before."""
     try:
-        return list(json.loads(model.with_suffix(".json").read_text(encoding="utf-8"))["sessions"])
-    except (OSError, ValueError, KeyError, TypeError):
+        return list(read_json(model.with_suffix(".json"))["sessions"])
+    except (FsidError, KeyError, TypeError):
         return []

@@ -18,11 +18,13 @@ import numpy as np
 from fsid.denoise.model import ModelCard, parse_card
 from fsid.denoise.nafnet import receptive_radius
 from fsid.errors import FsidError
+from fsid.files import read_whole
 from fsid.sensor import NoiseLevel
 
 CARD_KEY = "fsid_card"
 INPUTS = {"noisy", "k", "sigma2", "averages", "frozen"}
 OUTPUTS = {"clean", "averages_out"}
+_MOST_BYTES = 2 << 30  # of an ONNX file, by its format
 
 
 @dataclass(frozen=True)
@@ -65,10 +67,7 @@ class OnnxDenoiser:
 
 def load_onnx(file: Path) -> OnnxDenoiser:
     """A file of `fsid export`; FsidError where it is missing or something else."""
-    try:
-        return onnx_denoiser(file.read_bytes(), str(file))
-    except OSError as error:
-        raise FsidError(f"{file}: cannot be read ({error.strerror})") from None
+    return onnx_denoiser(read_whole(file, _MOST_BYTES), str(file))
 
 
 def onnx_denoiser(graph: bytes, source: str, *, threads: int = 0) -> OnnxDenoiser:

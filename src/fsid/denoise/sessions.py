@@ -22,6 +22,8 @@ from typing import Any
 
 import torch
 
+from fsid.config import read_json
+from fsid.errors import FsidError
 from fsid.files import write_atomically
 
 SESSIONS_FILE = "sessions.json"
@@ -62,8 +64,8 @@ class Session:
 def read_sessions(run_dir: Path) -> list[dict[str, Any]]:
     """The rows of a run; none where the file is absent or was not written by FSID."""
     try:
-        rows = json.loads((run_dir / SESSIONS_FILE).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        rows = read_json(run_dir / SESSIONS_FILE)
+    except FsidError:
         return []
     return [row for row in rows if isinstance(row, dict)] if isinstance(rows, list) else []
 

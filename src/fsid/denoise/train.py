@@ -28,7 +28,7 @@ from rich.console import Console
 from rich.text import Text
 from torch import Tensor
 
-from fsid.config import as_read, read_yaml, to_plain
+from fsid.config import as_read, read_json, read_yaml, to_plain
 from fsid.counted import counted
 from fsid.dataset.feed import batches
 from fsid.dataset.index import StoredMosaic, identity, index_mosaics
@@ -246,12 +246,12 @@ def _card(data_dir: Path, config: TrainConfig, images: int, initial: Denoiser | 
 def load_history(run_dir: str | Path) -> tuple[list[int], list[float], list[float]]:
     """Steps, losses and PSNRs (dB) of a run's training batches, means over `log_every` steps each."""
     path = Path(run_dir) / HISTORY_FILE
+    if not path.is_file():
+        raise FsidError(f"{path}: cannot be read; give the folder of a training")
     try:
-        rows = json.loads(path.read_text(encoding="utf-8"))
+        rows = read_json(path)
         return [row["step"] for row in rows], [row["loss"] for row in rows], [row["psnr"] for row in rows]
-    except OSError as error:
-        raise FsidError(f"{path}: cannot be read ({error.strerror}); give the folder of a training") from None
-    except (ValueError, KeyError, TypeError):
+    except (FsidError, KeyError, TypeError):
         raise FsidError(
             f"{path}: is not the history of a training; resume the run to write it again"
         ) from None

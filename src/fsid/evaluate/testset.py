@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fsid.config import from_plain, to_plain
+from fsid.config import from_plain, read_json, to_plain
 from fsid.dataset import find_photos, read_photo
 from fsid.dataset.pictures import pictures_digest
 from fsid.errors import FsidError
@@ -45,6 +45,7 @@ Progress = Callable[[int, int], None]
 TESTSET_FILE = "testset.json"
 _STEM = 60
 """Letters of a photograph's name in that of its folder: a file system takes 255 bytes."""
+_MOST_FRAMES = 10_000
 ALL_SETS = "all"
 """The name in results of all sets together."""
 
@@ -80,8 +81,8 @@ class TestSet:
     def __post_init__(self) -> None:
         if self.seed < 0:
             raise FsidError(f"seed {self.seed}: must not be negative")
-        if self.frames < 1:
-            raise FsidError(f"frames {self.frames}: must be at least 1")
+        if not 1 <= self.frames <= _MOST_FRAMES:
+            raise FsidError(f"frames {self.frames}: must be 1 to {_MOST_FRAMES}")
         for key, names in (("levels", self.levels), ("images", [image.name for image in self.images])):
             if not names or len(set(names)) < len(names):
                 raise FsidError(f"{key}: there must be at least one, each given once")
@@ -110,13 +111,9 @@ def read_testset(root: str | Path) -> TestSet:
     """The description of the test set in `root`; FsidError where it is missing or broken."""
     root = Path(root)
     file = root / TESTSET_FILE
-    try:
-        plain = json.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise FsidError(f"{file}: cannot be read ({error.strerror}); fsid testset makes one") from None
-    except ValueError as error:
-        raise FsidError(f"{file}: is not valid JSON ({error})") from None
-    testset = from_plain(TestSet, plain, source=str(file))
+    if not file.exists():
+        raise FsidError(f"{file}: is missing; fsid testset makes one")
+    testset = from_plain(TestSet, read_json(file), source=str(file))
     names = [*testset.levels, *(image.name for image in testset.images)]
     for name in names:
         if not name or name != Path(name).name:
@@ -267,9 +264,9 @@ def staged(out: Path) -> Iterator[Path]:
 def _left_by_a_killed_run(part: Path) -> list[Path]:
     """`part`, and beside it the images that were moved out while testset.json, the last, was still in it."""
     try:
-        plain = json.loads((part / TESTSET_FILE).read_text(encoding="utf-8"))
+        plain = read_json(part / TESTSET_FILE)
         names = {image.name for image in from_plain(TestSet, plain, source=str(part)).images}
-    except (OSError, ValueError, FsidError):
+    except FsidError:
         names = set()
     return [path for path in part.parent.iterdir() if path == part or path.name in names]
 

@@ -18,11 +18,13 @@ import numpy as np
 
 from fsid.assets.skies import XYZE, exr_size, size_flaw
 from fsid.errors import FsidError
+from fsid.files import read_whole
 from fsid.scene.colour import LUMINANCE
 from fsid.scene.model import Sky
 
 HEIGHT = 512
 MOST_HEIGHT = 2048
+_MOST_BYTES = 4 << 30  # of a file; the largest panorama takes a little more than half
 _ZENITH = np.array([0.42, 0.8, 1.7])
 _HORIZON = np.array([1.2, 1.25, 1.3])
 _THIN_CLOUD, _THICK_CLOUD = np.array([1.6, 1.75, 1.95]), np.array([0.75, 0.85, 1.0])
@@ -137,11 +139,7 @@ def _read(path: Path, changed_ns: int, size: int) -> np.ndarray:
 
 
 def _read_hdr(path: Path) -> np.ndarray:
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise FsidError(f"{path}: cannot be read ({error.strerror})") from None
-    rgbe = _radiance_hdr(data, path)
+    rgbe = _radiance_hdr(read_whole(path, _MOST_BYTES), path)
     scale = np.ldexp(np.float32(1), np.arange(256) - 136)
     scale[0] = 0
     scales = scale[rgbe[..., 3]]

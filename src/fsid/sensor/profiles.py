@@ -27,7 +27,7 @@ from numpy.polynomial.polynomial import polyval
 
 from fsid.config import parse_yaml, to_plain
 from fsid.errors import FsidError
-from fsid.files import write_atomically
+from fsid.files import read_whole, write_atomically
 from fsid.sensor.camera_profile import MONO, CameraProfile, Measurement, Optics
 from fsid.sensor.colour import is_of_camera, published_matrices
 from fsid.sensor.iso_law import k_law, sigma2_law
@@ -168,8 +168,8 @@ def _read(path: Path) -> str:
         names = ", ".join(profile_names())
         raise FsidError(f"profile {str(path)!r} is neither a file nor one of the built-in profiles: {names}")
     try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
+        return read_whole(path).decode()
+    except UnicodeDecodeError as error:
         raise FsidError(f"{path}: cannot read this profile as text: {error}") from error
 
 
