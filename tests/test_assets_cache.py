@@ -128,7 +128,10 @@ def test_the_folder_keeps_below_its_limit_and_loses_the_oldest(folder, monkeypat
         cached("x", content_key([bytes([number])]), 64, lambda: maps)
         path = folder / f"x-64-{content_key([bytes([number])])}.npz"
         os.utime(path, (1e9 + number, 1e9 + number))
-    (folder / "foreign.txt").write_text("stays")
+    foreign = {"foreign.txt", "foreign.npz", "x-64-12.npz", "y.part"}
+    for name in foreign:
+        (folder / name).write_text("stays")
+        os.utime(folder / name, (1, 1))
     one = path.stat().st_size
     monkeypatch.setattr(bake_cache, "LIMIT_BYTES", int(2.5 * one))
     first = folder / f"x-64-{content_key([bytes([0])])}.npz"
@@ -136,8 +139,8 @@ def test_the_folder_keeps_below_its_limit_and_loses_the_oldest(folder, monkeypat
     cached("x", content_key([bytes([9])]), 64, lambda: maps)
     kept = {p.name for p in folder.iterdir()}
     assert first.name in kept
-    assert "foreign.txt" in kept
-    assert sum(p.stat().st_size for p in folder.glob("*.npz")) <= 2.5 * one
+    assert foreign <= kept
+    assert sum(p.stat().st_size for p in folder.glob("*.npz") if p.name not in foreign) <= 2.5 * one
 
 
 def test_a_folder_that_cannot_be_written_is_done_without(tmp_path, monkeypatch):

@@ -151,6 +151,37 @@ def test_settings_of_something_else_are_not_replaced(photos: Path, tmp_path: Pat
     assert (tmp_path / "config.yaml").read_text() == "steps: 30\n"
 
 
+@pytest.mark.parametrize("name", ["README.md", "samples.png"])
+def test_files_of_something_else_are_not_replaced(photos: Path, tmp_path: Path, name: str):
+    """OUT may be the folder of a project, as with `fsid generate .`"""
+    (tmp_path / name).write_text("mine")
+    config = small(f"images={photos}")
+    for make in (generate, lambda out, config, count: pairs_to_make(out, dataset_config(config, 0), count)):
+        with pytest.raises(FsidError, match=f"holds another {name}, which the dataset's would replace"):
+            make(tmp_path, config, count=1)
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {name: "mine"}
+
+
+def test_a_card_that_was_edited_is_kept(photos: Path, tmp_path: Path):
+    config, card = small(f"images={photos}"), tmp_path / "README.md"
+    generate(tmp_path, config, count=1)
+    card.write_text("mine\n" + card.read_text())
+    before = card.read_text()
+    assert generate(tmp_path, config, count=1) == 0
+    with pytest.raises(FsidError, match="holds another README"):
+        generate(tmp_path, config, count=2)
+    assert card.read_text() == before
+
+
+def test_a_dataset_is_not_made_among_its_pictures(album: Path):
+    """Its contact sheet would be a picture of the next run."""
+    before = sorted(album.iterdir())
+    (album.parent / "link").symlink_to(album)
+    with pytest.raises(FsidError, match="link: is the folder of the pictures"):
+        generate(album.parent / "link", small(f"images={album}"), count=1)
+    assert sorted(album.iterdir()) == before
+
+
 def test_a_sample_of_numpys_numbers_is_that_of_pythons(photos: Path):
     config = small("width=64", "height=64", f"images={photos}")
     made = encode(make_sample(config, 3, 2, None))

@@ -131,6 +131,23 @@ def test_training_denoises(data: Path, tmp_path: Path) -> None:
     assert psnrs[-1] > psnrs[0]
 
 
+@pytest.mark.parametrize(
+    "name", ["model.safetensors", "initial.safetensors", "mine.safetensors", "shard-0.tar"]
+)
+def test_networks_and_data_that_lie_in_the_folder_are_not_replaced(
+    data: Path, tmp_path: Path, name: str
+) -> None:
+    """Without a config.yaml they are of no run that could go on."""
+    (tmp_path / name).write_bytes(b"mine")
+    (tmp_path / "initial.json").write_bytes(b"mine, too")
+    with pytest.raises(
+        FsidError, match="holds a dataset" if name.endswith(".tar") else f"holds {name} of no"
+    ):
+        train(data, tmp_path, CONFIG, quiet=True)
+    there = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    assert there == {name: b"mine", "initial.json": b"mine, too"}
+
+
 def test_a_killed_training_ends_with_the_same_bits(tmp_path: Path) -> None:
     """Killed at step 5: after a validation at 3 that wrote the best network, and a checkpoint at 4."""
     folder, rng = tmp_path / "data", np.random.default_rng(4)

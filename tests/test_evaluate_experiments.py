@@ -18,8 +18,8 @@ from fsid.cli.progress import progress_bar
 from fsid.config import read_yaml, save_settings
 from fsid.evaluate.claim import claimed
 from fsid.evaluate.compare import ImageRow
-from fsid.evaluate.dead_leaves import RADIUS_PX, dead_leaves_rand
-from fsid.evaluate.demo import ISOS, DemoConfig
+from fsid.evaluate.dead_leaves import RADIUS_PX, dead_leaves_rand, write_dead_leaves
+from fsid.evaluate.demo import ISOS, DemoConfig, _copy_photographs
 from fsid.evaluate.experiment_report import gaps
 from fsid.evaluate.experiments import PHOTOGRAPHS, TEST_ISOS, _data, _training, scale_config
 from fsid.sensor import load_profile, save_profile
@@ -228,6 +228,17 @@ def test_the_slider_of_a_report_moves_in_a_browser(photos: Path, tmp_path: Path)
     title = dom[dom.index("<title>") : dom.index("</title>")]
     assert "80%" in title
     assert "true" in title
+
+
+def test_nothing_is_written_through_a_link(tmp_path: Path):
+    """The folder of an experiment or a demo that goes on here may be a stranger's."""
+    mine = tmp_path / "mine"
+    mine.write_text("mine")
+    for name in ("000000.part", "astronaut.png"):
+        (tmp_path / name).symlink_to(mine)
+    write_dead_leaves(tmp_path, 1, height=32, width=32, seed=0)
+    _copy_photographs(tmp_path, 1)
+    assert mine.read_text() == "mine"
 
 
 def test_radii_of_dead_leaves_have_the_density_of_scale_invariance(monkeypatch):

@@ -49,14 +49,17 @@ def write_atomically(path: Path, data: bytes) -> None:
 def write_together(files: Mapping[Path, bytes]) -> None:
     """Write files that belong together: all lie on the disk before the first takes its place, in their order.
 
-    FsidError names the one that the disk refuses; then all are as they were.
+    FsidError names the one that the disk refuses; then all are as they were. So it does for what is no file:
+    renaming would put one in the place of /dev/null or of a pipe.
     """
     parts = {path: path.with_name(f"{path.name}.{os.getpid()}.part") for path in files}
     try:
         for path, data in files.items():
-            parts[path].write_bytes(data)
             if path.is_dir():
                 raise OSError(errno.EISDIR, os.strerror(errno.EISDIR))
+            if path.exists() and not path.is_file():
+                raise FsidError(f"{path}: cannot be written (it is no file); give another name")
+            parts[path].write_bytes(data)
         for path, part in parts.items():
             os.replace(part, path)
     except OSError as error:

@@ -19,6 +19,7 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 import os
+import re
 import secrets
 import zipfile
 import zlib
@@ -38,6 +39,9 @@ LIMIT_BYTES = 4 * 2**30
 
 Arrays = dict[str, np.ndarray]
 Result = TypeVar("Result")
+
+_ENTRY = re.compile(r".+-[0-9a-f]{32}\.npz(\.[0-9a-f]{16}\.part)?")
+"""What is deleted; FSID_CACHE may name a folder that holds other files, too."""
 
 _added: dict[Path, int] = {}
 """Bytes that this process has written to a folder since it looked at the folder's size."""
@@ -199,7 +203,7 @@ def _count(folder: Path, added_bytes: int) -> None:
 
 def _keep_below(folder: Path, limit_bytes: int) -> None:
     """Delete the entries used longest ago, and what killed processes left, until the rest fits."""
-    entries = [entry for entry in os.scandir(folder) if entry.name.endswith((".npz", ".part"))]
+    entries = [entry for entry in os.scandir(folder) if _ENTRY.fullmatch(entry.name)]
     stats = []
     for entry in entries:
         try:

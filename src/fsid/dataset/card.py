@@ -25,9 +25,11 @@ from fsid.dataset.config import DatasetConfig
 from fsid.dataset.index import index_mosaics
 from fsid.dataset.picture import grid
 from fsid.dataset.shards import read_member, read_records, shard_keys
-from fsid.files import write_atomically
+from fsid.errors import FsidError
+from fsid.files import check_file, write_atomically
 
 CARD, SHEET = "README.md", "samples.png"
+_TITLE = "# RAW pairs made by FSID"
 _TILES, _TILE_PX = 12, 240
 _FAMILIES_SHOWN = 200
 _MEASURED = 64
@@ -72,6 +74,20 @@ class _Tally:
         self.counts.setdefault(what, Counter())[which] += 1
 
 
+def check_card(out: Path) -> None:
+    """FsidError where the card of a dataset in `out` would replace files of something else."""
+    card, is_begun = out / CARD, (out / "config.yaml").exists()
+    if card.exists():
+        check_file(card)
+        with card.open("rb") as file:
+            if file.read(len(_TITLE)) == _TITLE.encode():
+                return
+    elif is_begun or not (out / SHEET).exists():
+        return
+    other = CARD if card.exists() else SHEET
+    raise FsidError(f"{out}: holds another {other}, which the dataset's would replace; use another folder")
+
+
 def write_card(out: Path, dataset: DatasetConfig, shards: Sequence[Path], command: str) -> None:
     """Write README.md and samples.png of the dataset in `out`. command: what made it, "" where unknown."""
     tally = _Tally()
@@ -96,7 +112,7 @@ def _text(dataset: DatasetConfig, tally: _Tally, statistics: Sequence[str], comm
         backgrounds = _listed(tally.counts.get("background", Counter()), "scenes")
         of_scenes = [f"| variant | {config.variant} |", f"| backgrounds | {backgrounds} |"]
     lines = [
-        "# RAW pairs made by FSID",
+        _TITLE,
         "",
         f"{counted(len(tally.isos), 'pair')} for {config.task}, {size} pixels at most, from {sources} "
         f"(fsid {__version__}, seed {dataset.seed}). "

@@ -8,6 +8,7 @@ goes on where it stopped, and one that is running keeps others out of its folder
 from __future__ import annotations
 
 import operator
+import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -18,7 +19,7 @@ from pathlib import Path
 from fsid.assets import sky_sources
 from fsid.assets.survey import KNOWN
 from fsid.config import as_read, from_plain, read_yaml, save_settings, to_plain
-from fsid.dataset.card import CARD, write_card
+from fsid.dataset.card import CARD, check_card, write_card
 from fsid.dataset.config import RENDERED, DatasetConfig, GenerateConfig
 from fsid.dataset.crew import Crew, LocalCrew, run
 from fsid.dataset.pictures import find_pictures, pictures_digest
@@ -120,7 +121,8 @@ def generate(
     out, count, workforce = Path(out), operator.index(count), workforce or Workforce(workers)
     dataset = dataset_config(config, seed, shard_size)
     with _locked(out):
-        if not is_begun(out, dataset):
+        if not _check_own(out, dataset):
+            check_card(out)
             save_settings(dataset, out / "config.yaml")
         todo = list(_missing(out, dataset, count))
         total = sum(len(shard.indices) for shard in todo)
@@ -128,6 +130,7 @@ def generate(
         progress(done, count)
         tasks_per_worker = max(1, SAMPLES_PER_WORKER // dataset.shard_size)
         if todo:
+            check_card(out)
             _withdraw_card(out)
             for _, made in run(workforce.crew(len(todo)), todo, tasks_per_worker=tasks_per_worker, lost=lost):
                 done += made
@@ -148,8 +151,10 @@ def pairs_to_make(out: Path, dataset: DatasetConfig, count: int) -> tuple[int, i
 
     FsidError where it holds others.
     """
-    is_begun(out, dataset)
+    _check_own(out, dataset)
     missing = list(_missing(out, dataset, count))
+    if missing:
+        check_card(out)
     return sum(len(shard.indices) for shard in missing), len(missing)
 
 
@@ -198,6 +203,14 @@ def _withdraw_card(out: Path) -> None:
         (out / CARD).unlink(missing_ok=True)
     except OSError as error:
         raise FsidError(f"{out}: cannot be written ({error.strerror})") from None
+
+
+def _check_own(out: Path, dataset: DatasetConfig) -> bool:
+    """`is_begun`; FsidError where the pictures lie in `out`, too: the contact sheet would be one of them."""
+    images = dataset.generate.images
+    if images and os.path.realpath(images) == os.path.realpath(out):
+        raise FsidError(f"{out}: is the folder of the pictures; give another one for the dataset")
+    return is_begun(out, dataset)
 
 
 def is_begun(out: Path, dataset: DatasetConfig) -> bool:

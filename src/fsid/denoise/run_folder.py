@@ -43,6 +43,12 @@ def prepare_run(data_dir: Path, run_dir: Path, config: TrainConfig, initial: Den
     file = run_dir / CONFIG_FILE
     there = _begun_with(file) if file.is_file() else None  # FsidError where the file is of something else
     is_begun = there is not None and has_network(run_dir)
+    if there is None and (others := sorted(run_dir.glob("*.safetensors"))):
+        raise FsidError(
+            f"{run_dir}: holds {others[0].name} of no training that it knows; give another folder"
+        )
+    if any(run_dir.glob("shard-*.tar")):
+        raise FsidError(f"{run_dir}: holds a dataset; give another folder for the run")
     if there is not None and is_begun:
         _check_same_run(data_dir, run_dir, there, config)
     try:

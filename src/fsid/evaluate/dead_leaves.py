@@ -15,9 +15,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from PIL import Image
 
-from fsid.dataset import to_uint8
+from fsid.dataset import save_png, to_uint8
 from fsid.errors import FsidError
 
 RADIUS_PX = (2.0, 400.0)
@@ -64,9 +63,7 @@ def write_dead_leaves(
             if path.exists():
                 continue
             rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(i,)))
-            part = path.with_suffix(".part")
-            Image.fromarray(to_uint8(dead_leaves_rand(rng, height, width))).save(part, format="PNG")
-            part.replace(path)
+            save_png(path, to_uint8(dead_leaves_rand(rng, height, width)))
         progress(count, count)
     except OSError as error:
         raise FsidError(f"{folder}: cannot be written ({error.strerror})") from None

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import io
 import json
-import shutil
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -46,6 +45,7 @@ from fsid.evaluate.models import model_method
 from fsid.evaluate.plots import loss_plot, noise_profile_plot
 from fsid.evaluate.report import Section, picture, write_report
 from fsid.evaluate.testset import photo_testset
+from fsid.files import write_atomically
 from fsid.sensor import develop, load_profile, read_raw
 
 PHOTOGRAPHS = (
@@ -148,7 +148,7 @@ def _copy_photographs(folder: Path, count: int) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     for package, name in PHOTOGRAPHS[:count]:
         with as_file(files(package).joinpath(name)) as file:
-            shutil.copyfile(file, folder / file.name)
+            write_atomically(folder / file.name, file.read_bytes())
     return folder
 
 
@@ -180,7 +180,7 @@ def _overview(out: Path, ours: Method, window_px: int = 180) -> np.ndarray:
     """
     shard, key = _pair_to_show(out / "data", window_px)
     for name in ("clean", "noisy"):
-        (out / f"pair.{name}.dng").write_bytes(read_member(shard, f"{key}.{name}.dng"))
+        write_atomically(out / f"pair.{name}.dng", read_member(shard, f"{key}.{name}.dng"))
     clean, noisy = (read_raw(out / f"pair.{name}.dng") for name in ("clean", "noisy"))
     scene, *others = (develop(raw) for raw in (clean, noisy, ours.denoise(noisy)))
     window, _ = detailed_window(scene, window_px)
