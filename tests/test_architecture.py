@@ -46,6 +46,11 @@ def test_what_holds_arrays_is_equal_to_itself_alone(path: Path):
                 assert all("eq=False" in text for text in made), node.name
 
 
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_what_is_printed_goes_through_the_terminal_that_shows_control_characters(path: Path):
+    assert "rich.console.Console" not in imported(path)
+
+
 def test_pairs_need_no_pytorch():
     script = (
         "import sys, fsid.dataset, fsid.evaluate, fsid.evaluate.doctor, fsid.cli.main;"

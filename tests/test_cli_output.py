@@ -3,18 +3,27 @@
 from __future__ import annotations
 
 import errno
+import io
+import json
 import os
+import re
 import shlex
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
+from rich.progress import Progress, TextColumn
+from rich.table import Table
+from rich.text import Text
 
 from fsid import __version__
 from fsid.cli import main as cli
 from fsid.cli import progress
 from fsid.pace import Pace
+from fsid.terminal import Terminal
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["generate", "--help"], ["profiles", "--help"]])
@@ -193,3 +202,51 @@ def test_a_configuration_that_is_none_is_refused_with_those_that_are(
     told = " ".join(capsys.readouterr().err.split())
     assert f"is no file and no built-in configuration ({names})" in told
     assert not any(tmp_path.iterdir())
+
+
+HOSTILE = "\x1b[31mred\x1b]0;title\x07\x9b1m\nb\rc\x00"
+
+
+def test_a_refusal_is_one_line_of_text_whatever_it_names(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    with pytest.raises(SystemExit):
+        cli.main(["inspect", str(tmp_path / HOSTILE.replace("\0", ""))])
+    line = capsys.readouterr().err
+    assert line.endswith("photographs\n")
+    assert line[:-1].isprintable()
+    assert r"\x1b[31mred\x1b]0;title\x07\x9b1m\nb\x0dc" in line
+
+
+def test_a_terminal_obeys_no_text_but_shows_it():
+    """Of cells, of single lines and of the label of a progress bar; styles stay."""
+    table = Table("a")
+    table.add_row(HOSTILE)
+    for thing in (table, Text(HOSTILE), HOSTILE, Progress(TextColumn(HOSTILE, markup=False))):
+        if isinstance(thing, Progress):
+            thing.add_task("x")
+        for colours in (True, False):
+            file = io.StringIO()
+            Terminal(file=file, markup=False, force_terminal=colours, width=200).print(thing, style="bold")
+            printed = file.getvalue()
+            assert ("\x1b[1m" in printed) == colours
+            text = re.sub(r"\x1b\[[0-9;]*m", "", printed)
+            assert r"\x1b[31mred" in text  # a cell has room for what the text was before
+            assert text.replace("\n", "").isprintable()
+
+
+def test_a_strangers_test_set_is_printed_as_text(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    photos = tmp_path / "photos"
+    photos.mkdir()
+    Image.fromarray(np.random.default_rng(0).integers(0, 255, (64, 64, 3)).astype(np.uint8)).save(
+        photos / "a.png"
+    )
+    made = tmp_path / "set"
+    cli.main(["testset", "photos", str(photos), "-o", str(made), "--iso", "800", "--quiet"])
+    file = made / "testset.json"
+    content = json.loads(file.read_text())
+    content["images"][0]["set"] = HOSTILE
+    file.write_text(json.dumps(content))
+    capsys.readouterr()
+    cli.main(["evaluate", str(made), "--quiet"])
+    out = capsys.readouterr().out
+    assert r"\x1b[31mred" in out
+    assert "\x1b" not in out

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 from tyro.conf import Positional
@@ -13,6 +12,7 @@ from tyro.conf import Positional
 from fsid.cli.arguments import Output, black_levels
 from fsid.cli.progress import progress_bar
 from fsid.cli.tables import print_table
+from fsid.terminal import Terminal
 
 if TYPE_CHECKING:
     from fsid.sensor.camera_fit import Calibration
@@ -84,7 +84,7 @@ def calibrate(
     pictures = {} if plot is None else {plot: calibration_picture(found, plot.suffix)}
     write_together({**pictures, output: profile_file(found.profile)})
     for note in found.notes:
-        Console(stderr=True, quiet=quiet).print(Text(f"note: {note}"), soft_wrap=True)
+        Terminal(stderr=True, quiet=quiet).print(Text(f"note: {note}"), soft_wrap=True)
     print_table(_table(found), quiet=quiet)
 
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
-from rich.console import Console
-
 from fsid.cli.arguments import Output
 from fsid.cli.progress import progress_bar
+from fsid.terminal import Terminal
 
 
 def demo(
@@ -41,4 +40,4 @@ def demo(
 
     config = DemoConfig(scenes, width, height, steps, photographs, seed)
     report = run_demo(output, config, partial(progress_bar, quiet=quiet))
-    Console(markup=False).print(f"report: {report.resolve()}", soft_wrap=True)
+    Terminal(markup=False).print(f"report: {report.resolve()}", soft_wrap=True)

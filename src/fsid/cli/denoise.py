@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from rich.console import Console
 from rich.text import Text
 from tyro.conf import Positional
 
@@ -16,6 +15,7 @@ from fsid.cli.arguments import black_levels
 from fsid.cli.iso_notes import note_extrapolation, note_files
 from fsid.cli.progress import progress_bar
 from fsid.errors import FsidError
+from fsid.terminal import Terminal, error_line
 
 if TYPE_CHECKING:
     from fsid.denoise import Noise
@@ -80,7 +80,7 @@ def denoise(
         _note_black(layout, profile, quiet=quiet)
     network = load_model(model, backend)
     check_options(profile, iso, strength, layout)
-    console = Console(stderr=True)
+    console = Terminal(stderr=True)
     if profile is not None and iso is not None:
         note_extrapolation([profile], iso, iso, quiet=quiet)
     elif profile is not None:
@@ -104,9 +104,7 @@ def denoise(
                     skip_existing=skip_existing,
                     progress=progress,
                     denoised=noises.__setitem__,
-                    failed=lambda error: console.print(
-                        Text(f"fsid: {error}", style="bold red"), soft_wrap=True
-                    ),
+                    failed=lambda error: console.print(error_line(error), soft_wrap=True),
                 )
         finally:  # what is to be said of those that are done does not depend on the others
             _note_guessed(noises, quiet=quiet)
@@ -131,7 +129,7 @@ def denoise(
 
 
 def _note(line: str, *, quiet: bool = False) -> None:
-    Console(stderr=True, quiet=quiet).print(Text(f"note: {line}"), soft_wrap=True)
+    Terminal(stderr=True, quiet=quiet).print(Text(f"note: {line}"), soft_wrap=True)
 
 
 def _note_black(layout: Layout, profile: str | None, *, quiet: bool) -> None:

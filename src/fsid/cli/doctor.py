@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from rich.console import Console
 from rich.table import Table
 from rich.text import Text
+
+from fsid.terminal import Terminal
 
 
 def doctor() -> None:
@@ -16,4 +17,4 @@ def doctor() -> None:
         for name, finding in examine():
             table.add_row(Text(name, style="bold"), Text(finding))
     finally:
-        Console().print(table)
+        Terminal().print(table)

@@ -8,11 +8,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
-from rich.console import Console
 from tyro.conf import Positional
 
 from fsid.cli.arguments import Output
 from fsid.cli.progress import progress_bar
+from fsid.terminal import Terminal
 
 
 def experiment(
@@ -83,4 +83,4 @@ def experiment(
     report = run_experiment(output, config, partial(progress_bar, quiet=quiet), workers=workers)
     if not quiet:
         rows = json.loads((output / "results.json").read_text(encoding="utf-8"))
-        Console(stderr=True, markup=False).print(f"{report}: {len(rows)} rows", soft_wrap=True)
+        Terminal(stderr=True, markup=False).print(f"{report}: {len(rows)} rows", soft_wrap=True)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal
 
-from rich.console import Console
 from tyro.conf import Positional
+
+from fsid.terminal import Terminal
 
 
 def export(
@@ -34,7 +35,7 @@ def export(
     done = export_network(run, output, precision)
     if not quiet:
         agreement = f", differs from PyTorch by {done.difference:.1e}" if done.difference else ""
-        Console(stderr=True).print(
+        Terminal(stderr=True).print(
             f"{done.file}: {done.precision}, {done.file.stat().st_size / 1e6:.2f} MB{agreement}; "
             f"{done.psnr:.2f} dB on photographs, of which the precision costs {done.loss_db:.3f} dB",
             soft_wrap=True,

@@ -10,7 +10,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from rich.console import Console
 from tyro.conf import Positional
 
 from fsid.cli.arguments import overrides
@@ -19,6 +18,7 @@ from fsid.cli.libraries import read_libraries
 from fsid.cli.progress import progress_bar
 from fsid.counted import counted
 from fsid.errors import FsidError
+from fsid.terminal import Terminal
 
 if TYPE_CHECKING:
     from fsid.dataset import DatasetConfig, GenerateConfig, Workforce
@@ -96,7 +96,7 @@ def generate(
         quality=quality,
         images=images and os.fspath(images),
     )
-    console = Console(stderr=True, quiet=quiet)
+    console = Terminal(stderr=True, quiet=quiet)
     if only and dry_run:
         raise FsidError("--dry-run: says what a dataset takes, not one sample; leave out --only")
     if only.endswith(".json") and (config or given or (count, seed) != (None, None)):
@@ -118,7 +118,7 @@ def generate(
     if not settings.images:
         read_libraries(settings.scene, quiet=quiet)
     if dry_run:
-        Console(markup=False).print(_plan(out, settings, dataset, count, workforce), soft_wrap=True)
+        Terminal(markup=False).print(_plan(out, settings, dataset, count, workforce), soft_wrap=True)
     else:
         if not is_begun(out, dataset):
             _check_sources(settings, count, workforce, quiet=quiet)

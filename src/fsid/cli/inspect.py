@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from rich.console import Console
 from rich.table import Table
 from tyro.conf import Positional
 
 from fsid.cli.progress import progress_bar
 from fsid.cli.tables import print_table
 from fsid.counted import counted
+from fsid.terminal import Terminal
 
 
 def inspect(
@@ -66,7 +66,7 @@ def inspect(
         table.add_row(*row)
     print_table(table)
     if found.yardstick:
-        Console(markup=False).print(f"relative: {found.yardstick}.")
+        Terminal(markup=False).print(f"relative: {found.yardstick}.")
     if out is not None:
         results = {
             out / "statistics.png": inspection_picture(found),

@@ -6,16 +6,15 @@ from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 
-from rich.console import Console
-
 from fsid.errors import FsidError
+from fsid.terminal import Terminal
 
 
 def note_extrapolation(names: Iterable[str], iso_min: float, iso_max: float, *, quiet: bool) -> None:
     """A line for each profile whose measured ISOs the range exceeds by more than two stops."""
     from fsid.sensor import far_extrapolated
 
-    console = Console(stderr=True, quiet=quiet)
+    console = Terminal(stderr=True, quiet=quiet)
     for profile in far_extrapolated(names, iso_min, iso_max):
         console.print(
             f"note: profile {profile.name} was measured at {_range(profile.iso[0], profile.iso[-1])}; "

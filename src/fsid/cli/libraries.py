@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from rich.console import Console
-
 from fsid.cli.progress import progress_bar
 from fsid.counted import counted
+from fsid.terminal import Terminal
 
 if TYPE_CHECKING:
     from fsid.scene import SceneConfig
@@ -41,7 +40,7 @@ def _tell(found: str, skipped: Sequence[tuple[str, str]], *, quiet: bool) -> Non
 
     if skipped:
         name, reason = skipped[0]
-        Console(stderr=True, quiet=quiet).print(
+        Terminal(stderr=True, quiet=quiet).print(
             f"{found}, {len(skipped)} skipped, first {name.removeprefix(PREFIX)}: {reason}",
             style="yellow",
             soft_wrap=True,

@@ -16,8 +16,6 @@ from types import FrameType
 from typing import NoReturn, TextIO
 
 import tyro
-from rich.console import Console
-from rich.text import Text
 
 from fsid import __version__
 from fsid.cli import (
@@ -38,6 +36,7 @@ from fsid.cli import (
     train,
 )
 from fsid.errors import FsidError
+from fsid.terminal import Terminal, error_line
 
 COMMANDS: dict[str, Callable[..., None]] = {
     "generate": generate.generate,
@@ -145,7 +144,7 @@ def _run(arguments: Sequence[str] | None) -> None:
         what, code = ("terminated", 143) if isinstance(signalled, _Terminated) else ("interrupted", 130)
         goes_on = set(sys.argv[1:2] if arguments is None else arguments[:1]) & RESUMABLE
         hint = "; the same command goes on from what is finished" if goes_on else ""
-        Console(stderr=True).print(f"fsid: {what}{hint}")
+        Terminal(stderr=True).print(f"fsid: {what}{hint}")
         sys.exit(code)
 
 
@@ -177,5 +176,5 @@ def _check_repeated(arguments: Sequence[str]) -> None:
 
 
 def _fail(line: str) -> NoReturn:
-    Console(stderr=True).print(Text(f"fsid: {line}", style="bold red"), soft_wrap=True)
+    Terminal(stderr=True).print(error_line(line), soft_wrap=True)
     sys.exit(2)

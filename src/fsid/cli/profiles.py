@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rich.console import Console
 from rich.table import Column, Table
 from rich.text import Text
 from tyro.conf import Positional
 
 from fsid.cli.tables import print_table
 from fsid.errors import FsidError
+from fsid.terminal import Terminal
 
 
 def profiles(name: Positional[str | None] = None, *, plot: Path | None = None) -> None:
@@ -39,7 +39,7 @@ def profiles(name: Positional[str | None] = None, *, plot: Path | None = None) -
         print_table(table)
         return
     profile = load_profile(name)
-    console = Console()
+    console = Terminal()
     integers = f"  CFA {profile.cfa}, DN {profile.black_level}..{profile.white_level}"
     console.print(Text(profile.camera, style="bold"), integers, sep="")
     console.print(

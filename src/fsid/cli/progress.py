@@ -8,13 +8,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TaskID, TextColumn
 from rich.table import Column
 from rich.text import Text
 
 from fsid.counted import counted
 from fsid.pace import Pace
+from fsid.terminal import Terminal
 
 
 class _Speed(ProgressColumn):
@@ -63,7 +63,7 @@ def progress_bar(label: str, unit: str, *, quiet: bool) -> Iterator[Bar]:
         _Speed(pace, unit),
         TextColumn("[yellow]{task.fields[failures]}"),
     )
-    bar = Progress(*columns, console=Console(stderr=True, quiet=quiet))
+    bar = Progress(*columns, console=Terminal(stderr=True, quiet=quiet))
     task = bar.add_task(label, total=None, failures="")
     try:
         yield Bar(bar, task, unit, pace)

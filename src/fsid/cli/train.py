@@ -7,12 +7,12 @@ import shlex
 import sys
 from pathlib import Path
 
-from rich.console import Console
 from tyro.conf import Positional
 
 from fsid.cli.arguments import Output
 from fsid.cli.iso_notes import note_extrapolation
 from fsid.errors import FsidError
+from fsid.terminal import Terminal
 
 
 def train(
@@ -51,7 +51,7 @@ def train(
     note_extrapolation(settings.profiles, settings.iso_min, settings.iso_max, quiet=quiet or not is_main)
     task = task_of(data)
     if task != "denoise" and is_main and not quiet:
-        Console(stderr=True).print(
+        Terminal(stderr=True).print(
             f"note: {data} holds pairs for {task}, but this trains a denoiser: "
             "it takes their clean images alone and draws noise for them",
             soft_wrap=True,
@@ -60,4 +60,4 @@ def train(
     command = shlex.join(["fsid", *sys.argv[1:]])
     model = train_network(data, output, settings, resume=resume, quiet=quiet, command=command)
     if not quiet and is_main:
-        Console(stderr=True).print(f"model: {model}", soft_wrap=True, markup=False)
+        Terminal(stderr=True).print(f"model: {model}", soft_wrap=True, markup=False)

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from types import TracebackType
 
-from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from rich.table import Column
 
 from fsid.denoise.train_config import TrainConfig
 from fsid.pace import Pace
+from fsid.terminal import Terminal
 
 _SMOOTHING = 0.05  # of the shown loss and PSNR, which jump from batch to batch
 _WIDE = 100  # columns of a terminal that has room for a bar and the loss
@@ -22,7 +22,7 @@ class LiveLine:
     """Context manager; nothing is shown where `quiet`."""
 
     def __init__(self, config: TrainConfig, step: int, processes: int, *, quiet: bool) -> None:
-        console = Console(stderr=True, quiet=quiet)
+        console = Terminal(stderr=True, quiet=quiet)
         self._is_wide = console.width >= _WIDE
         columns = (
             TextColumn("train"),

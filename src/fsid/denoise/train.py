@@ -24,7 +24,6 @@ import numpy as np
 import torch
 from accelerate import Accelerator
 from accelerate.state import AcceleratorState, GradientState, PartialState
-from rich.console import Console
 from rich.text import Text
 from torch import Tensor
 
@@ -46,6 +45,7 @@ from fsid.denoise.train_config import TrainConfig
 from fsid.denoise.validate import held_out, validation
 from fsid.errors import FsidError
 from fsid.files import check_folder, held, write_atomically
+from fsid.terminal import Terminal
 
 HISTORY_FILE, VALIDATION_FILE = "history.json", "validation.json"
 LAST_FILE = "last.safetensors"  # beside the best network, `MODEL_FILE`
@@ -280,7 +280,7 @@ def mean_psnr(estimate: Tensor, clean: Tensor) -> Tensor:
 def _note_nothing_held_out(data_dir: Path) -> None:
     why = "none is held out for validation, which takes five scenes or pictures when a training begins"
     line = f"note: {data_dir}: {why}; {MODEL_FILE} is the network at the last step"
-    Console(stderr=True).print(Text(line), soft_wrap=True)
+    Terminal(stderr=True).print(Text(line), soft_wrap=True)
 
 
 def _patch_config(config: TrainConfig) -> PatchConfig:
