@@ -173,6 +173,26 @@ def test_a_card_that_was_edited_is_kept(photos: Path, tmp_path: Path):
     assert card.read_text() == before
 
 
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("split", None), ("frame", {}), ("iso", "x"), ("refused", 5), ("scene", {"objects": 1})],
+)
+def test_a_record_of_something_else_is_named(photos: Path, tmp_path: Path, key: str, value: object):
+    """A dataset that goes on here may be from anywhere; None: without the key."""
+    config = small(f"images={photos}")
+    generate(tmp_path, config, count=1)
+    shard = shard_path(tmp_path, 0)
+    samples = read_samples(shard)
+    for files in samples.values():
+        record = json.loads(files["json"]) | {key: value}
+        files["json"] = json.dumps({k: v for k, v in record.items() if v is not None}).encode()
+    write_shard(shard, samples.items())
+    (tmp_path / "README.md").unlink()
+    with pytest.raises(FsidError, match=r"shard-00000\.tar: .* generate again"):
+        generate(tmp_path, config, count=1)
+    assert not (tmp_path / "README.md").exists()
+
+
 def test_a_dataset_is_not_made_among_its_pictures(album: Path):
     """Its contact sheet would be a picture of the next run."""
     before = sorted(album.iterdir())

@@ -660,7 +660,15 @@ def test_bad_input_is_named(data: Path, tmp_path: Path) -> None:
         train(data, tmp_path / "run", replace(CONFIG, seed=1), quiet=True)
     checkpoint = tmp_path / "run" / "checkpoint.safetensors"
     tensors, good = load_file(checkpoint), {"step": 1, "history": [], "validation": [], "pending": []}
-    for lie in ({"step": "x"}, {"step": 1.5}, {"history": 3}, {"history": [3]}, {"pending": [[1, 2, 3]]}):
+    for lie in (
+        {"step": "x"},
+        {"step": 1.5},
+        {"step": -1},
+        {"step": 10**30},
+        {"history": 3},
+        {"history": [3]},
+        {"pending": [[1, 2, 3]]},
+    ):
         save_file(tensors, checkpoint, {"progress": json.dumps(good | lie)})
         with pytest.raises(FsidError, match=r"checkpoint\.safetensors: has no training progress"):
             train(data, tmp_path / "run", replace(CONFIG, steps=2), quiet=True)

@@ -16,12 +16,13 @@ import pytest
 from fsid.cli.main import main
 from fsid.cli.progress import progress_bar
 from fsid.config import read_yaml, save_settings
+from fsid.errors import FsidError
 from fsid.evaluate.claim import claimed
-from fsid.evaluate.compare import ImageRow
+from fsid.evaluate.compare import ImageRow, write_images
 from fsid.evaluate.dead_leaves import RADIUS_PX, dead_leaves_rand, write_dead_leaves
 from fsid.evaluate.demo import ISOS, DemoConfig, _copy_photographs
 from fsid.evaluate.experiment_report import gaps
-from fsid.evaluate.experiments import PHOTOGRAPHS, TEST_ISOS, _data, _training, scale_config
+from fsid.evaluate.experiments import PHOTOGRAPHS, TEST_ISOS, _data, _read_images, _training, scale_config
 from fsid.sensor import load_profile, save_profile
 
 SMOKE = ("--scale", "smoke", "--count", "2", "--steps", "3", "--quiet")
@@ -228,6 +229,25 @@ def test_the_slider_of_a_report_moves_in_a_browser(photos: Path, tmp_path: Path)
     title = dom[dom.index("<title>") : dom.index("</title>")]
     assert "80%" in title
     assert "true" in title
+
+
+def test_figures_of_something_else_are_not_taken_for_measured_ones(tmp_path: Path):
+    """Also where columns were moved, which would be other figures without a word."""
+    file = tmp_path / "a.csv"
+    row = ImageRow("m", "iso800", "s", "i", 40.0, 30.0, 0.5)
+    write_images([row], file)
+    assert _read_images(file) == [row]
+    whole = file.read_text()
+    for wrong in (
+        "",
+        whole.replace("30.0000", "x"),
+        whole.replace(",0.5000", ""),
+        whole.replace("psnr_raw,psnr,ssim", "ssim,psnr_raw,psnr"),
+        whole.replace("model,", "model,more,"),
+    ):
+        file.write_text(wrong)
+        with pytest.raises(FsidError, match=r"a\.csv: holds no figures of images; delete it"):
+            _read_images(file)
 
 
 def test_nothing_is_written_through_a_link(tmp_path: Path):

@@ -24,7 +24,7 @@ from fsid.counted import counted
 from fsid.dataset.config import DatasetConfig
 from fsid.dataset.index import index_mosaics
 from fsid.dataset.picture import grid
-from fsid.dataset.shards import read_member, read_records, shard_keys
+from fsid.dataset.shards import read_member, read_records, records_of, shard_keys
 from fsid.errors import FsidError
 from fsid.files import check_file, write_atomically
 
@@ -49,7 +49,7 @@ class _Tally:
     def add(self, record: dict[str, Any]) -> None:
         self._count("split", record["split"])
         self._count("camera", record["camera"])
-        self.isos.append(record["iso"])
+        self.isos.append(float(record["iso"]))
         if record["frame"] in self.frames:
             return
         self.frames.add(record["frame"])
@@ -92,8 +92,9 @@ def write_card(out: Path, dataset: DatasetConfig, shards: Sequence[Path], comman
     """Write README.md and samples.png of the dataset in `out`. command: what made it, "" where unknown."""
     tally = _Tally()
     for shard in shards:
-        for record in read_records(shard):
-            tally.add(record)
+        with records_of(shard):
+            for record in read_records(shard):
+                tally.add(record)
     write_atomically(out / SHEET, _sheet(shards))
     text = _text(dataset, tally, list(_statistics(out)), command)
     write_atomically(out / CARD, text.encode(errors="backslashreplace"))

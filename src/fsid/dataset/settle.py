@@ -19,7 +19,7 @@ import numpy as np
 
 from fsid.dataset.config import GenerateConfig
 from fsid.dataset.sample import ATTEMPTS, encode, make_frame
-from fsid.dataset.shards import read_records, read_samples, write_shard
+from fsid.dataset.shards import read_records, read_samples, records_of, write_shard
 from fsid.dataset.worker import Worker
 
 REDRAWS = ATTEMPTS // 2
@@ -111,11 +111,12 @@ def settle(shards: Sequence[Path], config: GenerateConfig, seed: int, do: Callab
 def _has_open(shard: Path, looks: Looks) -> bool:
     """Whether a frame of the shard has to be drawn again; if none, all are remembered."""
     before = looks.count
-    for frame in _frames(read_records(shard)):
-        if frame.is_open(looks):
-            looks.forget(before)
-            return True
-        looks.add(frame.looks)
+    with records_of(shard):
+        for frame in _frames(read_records(shard)):
+            if frame.is_open(looks):
+                looks.forget(before)
+                return True
+            looks.add(frame.looks)
     return False
 
 

@@ -128,6 +128,18 @@ def read_records(path: Path) -> Iterator[dict[str, Any]]:
         yield read_record(data, f"{path}: {name}")
 
 
+@contextmanager
+def records_of(path: Path) -> Iterator[None]:
+    """FsidError where the block fails for what the records of a shard lack, or hold instead."""
+    try:
+        yield
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        reason = f"lacks {error}" if isinstance(error, KeyError) else str(error)
+        raise FsidError(
+            f"{path}: the JSON of a sample is not of fsid generate ({reason}); delete it and generate again"
+        ) from None
+
+
 def read_files(path: Path, suffix: str = "") -> Iterator[tuple[str, bytes]]:
     """Name and content of the files of a shard whose names end so. FsidError where it is not readable."""
     with open_shard(path) as (tar, members):

@@ -117,6 +117,8 @@ def _progress(header: Mapping[str, str], path: Path) -> TrainState:
     try:
         plain = json.loads(header["progress"])
         from_plain(_Progress, dict(plain), source=str(path))
+        if not 0 <= plain["step"] < 2**53:
+            raise ValueError
     except (KeyError, ValueError, TypeError, RecursionError, FsidError):
         raise FsidError(f"{path}: has no training progress in its header; delete it to start again") from None
     pending = [(loss, psnr) for loss, psnr in plain["pending"]]

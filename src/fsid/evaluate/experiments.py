@@ -11,10 +11,12 @@ weights, patches and noise; the data set of a source is one and the same, of the
 from __future__ import annotations
 
 import csv
+import io
 import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, fields, replace
+from itertools import product
 from pathlib import Path
 from typing import Literal
 
@@ -49,6 +51,7 @@ from fsid.evaluate.models import model_method
 from fsid.evaluate.simulated import LUXES, simulated_testset
 from fsid.evaluate.testbench import MATERIALS
 from fsid.evaluate.testset import ALL_SETS, levels_of, photo_testset, read_testset
+from fsid.files import read_whole
 from fsid.scene import VARIANTS
 from fsid.sensor import load_bayer_profile
 
@@ -307,14 +310,28 @@ def _measured(
                 images += compare(testset, methods, progress=progress).images
         write_images(images, file)
     images = _read_images(file)
-    rows = [row for testset in testsets for row in summarise(read_testset(testset), methods, images)]
+    there = {(row.model, row.level, row.set, row.image) for row in images}
+    rows: list[Row] = []
+    for made in map(read_testset, testsets):
+        for method, level, image in product(methods, made.levels, made.images):
+            if (method.name, level, image.set, image.name) not in there:
+                raise FsidError(f"{file}: lacks {image.name} at {level}; delete it to measure all again")
+        rows += summarise(made, methods, images)
     return rows, images
 
 
 def _read_images(file: Path) -> list[ImageRow]:
+    names = [field.name for field in fields(ImageRow)]
     numbers = {field.name for field in fields(ImageRow) if field.type == "float"}
-    with file.open(newline="", encoding="utf-8") as stream:
+    try:
+        header, *lines = csv.reader(io.StringIO(read_whole(file).decode(), newline=""))
+        if header != names:
+            raise ValueError
         return [
-            ImageRow(*(float(v) if key in numbers else v for key, v in line.items()))  # type: ignore[arg-type]
-            for line in csv.DictReader(stream)
+            ImageRow(*(float(v) if n in numbers else v for n, v in zip(names, line, strict=True)))  # type: ignore[arg-type]
+            for line in lines
         ]
+    except (ValueError, csv.Error):
+        raise FsidError(
+            f"{file}: holds no figures of images; delete it, and they are measured again"
+        ) from None
