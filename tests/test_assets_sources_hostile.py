@@ -192,6 +192,16 @@ def library(path: Path, catalogue: str, members: dict[str, bytes]) -> None:
             archive.writestr(name, content)
 
 
+def test_a_pipe_or_a_device_named_like_a_library_is_left_out(tmp_path: Path):
+    """A pipe would be waited for, and a device read without end; this test would hang."""
+    trimesh.creation.box().export(tmp_path / "good.ply")
+    os.mkfifo(tmp_path / "pipe.sh3f")
+    (tmp_path / "zero.sh3f").symlink_to("/dev/zero")
+    found = survey_meshes(str(tmp_path))
+    assert [source.name for source in found.usable] == [f"file:{tmp_path / 'good.ply'}"]
+    assert [reason for _, reason in found.skipped] == ["not a file", "not a file"]
+
+
 def test_a_decompression_bomb_is_not_unpacked(tmp_path: Path):
     library(tmp_path / "bomb.sh3f", "model#1=bomb.obj\n", {"bomb.obj": b"\n" * (300 * 2**20)})
     assert "unpacks to 300 MiB" in refused(tmp_path)

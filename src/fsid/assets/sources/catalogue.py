@@ -67,6 +67,8 @@ def read_member(path: Path, member: str) -> bytes:
 
 def open_archive(path: Path) -> zipfile.ZipFile:
     """A zip whose directory is of bearable size. Raises RefusedError."""
+    if path.exists() and not path.is_file():  # a pipe may stay silent, and a device has no end
+        raise RefusedError("not a file")
     try:
         _check_directory(path)
         return zipfile.ZipFile(path)
