@@ -53,6 +53,13 @@ def test_what_is_not_a_model_is_named(model_file: Path, tmp_path: Path) -> None:
             load_denoiser(model_file)
 
 
+@pytest.mark.parametrize("device", ["gpu", "meta", "cuda:99"])
+def test_a_device_that_is_not_there_is_named(model_file: Path, device: str) -> None:
+    """In one line: PyTorch has an error of its own for each of these."""
+    with pytest.raises(FsidError, match=f"^device {device}: PyTorch cannot use it .*; cpu[^\\n]*$"):
+        load_denoiser(model_file, device)
+
+
 def test_a_file_that_does_not_fit_its_card_is_named(model_file: Path) -> None:
     weights = RawDenoiser(CARD.network).state_dict()
     save_file({name: tensor.contiguous() for name, tensor in weights.items()}, model_file)

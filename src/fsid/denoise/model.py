@@ -129,8 +129,9 @@ def load_denoiser(run_or_file: str | Path | None = None, device: str | torch.dev
     """Load a run folder's network, a .safetensors file, or a shipped network by name; None: the default one.
 
     Weights may be stored in half precision; they are used in single. Raises FsidError where the file is
-    missing, broken, not a network of FSID, or does not fit its own card.
+    missing, broken, not a network of FSID, or does not fit its own card, and where `device` is not there.
     """
+    target = _usable(device)
     path = model_path(run_or_file)
     weights, header = read_tensors(
         path, "a model: give a run folder of `fsid train` or its model.safetensors"
@@ -142,8 +143,18 @@ def load_denoiser(run_or_file: str | Path | None = None, device: str | torch.dev
         check_weights(RawDenoiser(card.network), weights, path)
     net = RawDenoiser(card.network)
     net.load_state_dict(weights)
-    target = torch.device(device)
     return Denoiser(net.to(target).eval().requires_grad_(False), card, target)
+
+
+def _usable(device: str | torch.device) -> torch.device:
+    """A device that numbers can be sent to and come back from; FsidError for any other."""
+    try:
+        target = torch.device(device)
+        torch.zeros(1, device=target).cpu()
+    except (RuntimeError, AssertionError) as error:  # the latter where PyTorch was built without it
+        reason = str(error).partition("\n")[0].rstrip(".")
+        raise FsidError(f"device {device}: PyTorch cannot use it ({reason}); cpu is always there") from None
+    return target
 
 
 def parse_card(text: str, source: str) -> ModelCard:
