@@ -43,6 +43,16 @@ def test_what_has_no_range_of_one_or_another_shape_is_refused(metric):
         metric(grey, light)
     with pytest.raises(FsidError, match="cannot be compared"):
         metric(grey / 255, light[:1] / 255)
+    with pytest.raises(FsidError, match=r"truth: its mean is 200.*divide"):
+        metric(grey.astype(np.float32), light.astype(np.float32))
+
+
+@pytest.mark.parametrize("metric", [psnr, ssim])
+def test_an_estimate_may_be_anything_and_a_truth_saturated(metric):
+    """A network that diverged has a figure, and so has a frame of which all is above the white level."""
+    diverged, saturated = np.full((16, 16, 3), 1e6), np.full((16, 16, 3), 1.3)
+    assert np.isfinite(metric(diverged, np.full((16, 16, 3), 0.5)))
+    assert metric(diverged, saturated) == metric(saturated, saturated)
 
 
 def test_ssim_of_less_than_its_window_is_refused():

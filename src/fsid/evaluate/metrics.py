@@ -13,6 +13,8 @@ from skimage.metrics import structural_similarity
 from fsid.errors import FsidError
 
 _WINDOW_PX = 11
+_BRIGHTEST_MEAN = 2.0
+"""Of a truth: one of 0..1 has less even where a sensor is saturated, one of 0..255 more unless black."""
 
 
 def psnr(image: np.ndarray, truth: np.ndarray) -> float:
@@ -20,11 +22,12 @@ def psnr(image: np.ndarray, truth: np.ndarray) -> float:
 
     NaN where a value is infinite or NaN: clipped, an image of such values would be white, and comparable.
 
-    FsidError for arrays of different shapes or of integers.
+    FsidError for arrays of different shapes or of integers, and for a truth that looks like 0..255.
     """
     _check_alike(image, truth)
     if not (np.isfinite(image).all() and np.isfinite(truth).all()):
         return float("nan")
+    _check_range(truth)
     error = np.mean(np.square(np.clip(image, 0, 1) - np.clip(truth, 0, 1), dtype=np.float64))
     return float(-10.0 * np.log10(error)) if error != 0 else float("inf")
 
@@ -33,7 +36,7 @@ def ssim(image: np.ndarray, truth: np.ndarray) -> float:
     """Structural similarity (Wang et al. 2004) of two (H, W, 3) images, range 0..1, mean over channels.
 
     NaN as in `psnr`.
-    FsidError for images of different shapes, of integers, or of less than 11x11 pixels.
+    FsidError as in `psnr`, and for images of less than 11x11 pixels.
     """
     _check_alike(image, truth)
     if image.ndim != 3 or min(image.shape[:2]) < _WINDOW_PX:
@@ -42,6 +45,7 @@ def ssim(image: np.ndarray, truth: np.ndarray) -> float:
         )
     if not (np.isfinite(image).all() and np.isfinite(truth).all()):
         return float("nan")
+    _check_range(truth)
     return float(
         structural_similarity(
             np.clip(image, 0, 1),
@@ -63,3 +67,9 @@ def _check_alike(image: np.ndarray, truth: np.ndarray) -> None:
         raise FsidError(
             f"images of {image.dtype} and {truth.dtype}: give values in 0..1; divide 8-bit ones by 255"
         )
+
+
+def _check_range(truth: np.ndarray) -> None:
+    """Clipped, a picture of 0..255 is white. An image may hold anything: a diverged network has a figure."""
+    if truth.size and (mean := float(np.mean(truth, dtype=np.float64))) > _BRIGHTEST_MEAN:
+        raise FsidError(f"truth: its mean is {mean:.4g}, of values in 0..1; divide those of 8 bits by 255")
