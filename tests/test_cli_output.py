@@ -72,9 +72,10 @@ def test_a_full_disk_under_the_output_is_one_line(arguments: list[str]) -> None:
     assert (ended.returncode, ended.stderr) == (2, "fsid: No space left on device\n")
 
 
-def test_a_closed_output_does_not_fail_a_command() -> None:
+@pytest.mark.parametrize("arguments", ["--help", "profiles", "profiles --help"])
+def test_a_closed_output_does_not_fail_a_command(arguments: str) -> None:
     """As `fsid ... >&-`, or a job without one."""
-    command = f"{shlex.quote(sys.executable)} -m fsid profiles >&-"
+    command = f"{shlex.quote(sys.executable)} -m fsid {arguments} >&-"
     ended = subprocess.run(["sh", "-c", command], stderr=subprocess.PIPE, text=True)
     assert (ended.returncode, ended.stderr) == (0, "")
 
@@ -88,6 +89,8 @@ def test_a_name_that_is_no_text_fails_no_command(photos: Path, tmp_path: Path, e
     for last in (["--dry-run"], []):
         subprocess.run([*command, *small, *last], check=True, capture_output=True, env=environment)
     assert r"tr\udcfc" in Path(os.fsdecode(out), "README.md").read_text(encoding="utf-8")
+    looked_at = [sys.executable, "-m", "fsid", "inspect", out, "--out", out + b".looked-at"]
+    subprocess.run(looked_at, check=True, capture_output=True, env=environment)
 
 
 def test_brackets_in_a_name_are_printed(photos: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -80,6 +80,7 @@ class _Terminated(KeyboardInterrupt):
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run one command, in the main thread; exit code 0 when done, 2 for bad input or a full disk, 130 after
     Ctrl-C, 143 after SIGTERM, 141 when nobody reads on."""
+    _open_closed()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # a file's name may be no text in its encoding
             stream.reconfigure(errors="backslashreplace")
@@ -88,8 +89,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         try:
             _run(arguments)
         finally:
-            if sys.stdout is not None:
-                sys.stdout.flush()
+            sys.stdout.flush()
     except OSError as error:
         is_closed = isinstance(error, BrokenPipeError) and not _is_read(sys.stdout)
         if not is_closed and error.errno not in FULL:
@@ -101,6 +101,19 @@ def main(arguments: Sequence[str] | None = None) -> None:
         _fail(os.strerror(error.errno or 0))
     finally:
         signal.signal(signal.SIGTERM, before)
+
+
+def _open_closed() -> None:
+    """Send to nowhere what is printed on a closed output: neither help nor errors ask whether there is one.
+
+    Each takes the lowest number that is free: a file of the dataset would have it, and what a driver prints.
+    """
+    if sys.stdin is None:
+        sys.stdin = open(os.devnull)  # noqa: SIM115  for as long as the process lives
+    if sys.stdout is None:
+        sys.stdout = open(os.devnull, "w")  # noqa: SIM115
+    if sys.stderr is None:
+        sys.stderr = open(os.devnull, "w")  # noqa: SIM115
 
 
 def _terminate(number: int, frame: FrameType | None) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from fsid.assets.file_names import shown
 from fsid.dataset.inspect import Inspection
 from fsid.dataset.statistics import TITLES
 
@@ -41,8 +42,8 @@ def inspection_picture(inspection: Inspection) -> bytes:
 
 
 def as_label(name: str) -> str:
-    """`name` as matplotlib shows it literally: no mathematics, and not left out of a legend."""
-    literal = name.replace("$", r"\$")
+    """`name` as matplotlib shows it literally: no mathematics, not left out of a legend, and text."""
+    literal = shown(name).replace("$", r"\$")
     return f" {literal}" if name.startswith("_") else literal
 
 
