@@ -85,7 +85,10 @@ def check_card(out: Path) -> None:
     elif is_begun or not (out / SHEET).exists():
         return
     other = CARD if card.exists() else SHEET
-    raise FsidError(f"{out}: holds another {other}, which the dataset's would replace; use another folder")
+    raise FsidError(
+        f"{out}: holds another {other}, which the dataset's would replace; "
+        "move it away, or use another folder"
+    )
 
 
 def write_card(out: Path, dataset: DatasetConfig, shards: Sequence[Path], command: str) -> None:
