@@ -130,6 +130,19 @@ def _holes(path: Path) -> None:
 
 
 @pytest.mark.usefixtures("patience")
+def test_what_the_shell_passes_is_read() -> None:
+    """`fsid generate --config <(command)`; a command without end is not."""
+    read, write = os.pipe()
+    os.write(write, b"width: 64")
+    os.close(write)
+    assert read_yaml(Path(f"/dev/fd/{read}")) == {"width": 64}
+    os.close(read)
+    zeros = os.open("/dev/zero", os.O_RDONLY)
+    with pytest.raises(FsidError, match="too large"):
+        read_yaml(Path(f"/dev/fd/{zeros}"))
+    os.close(zeros)
+
+
 @pytest.mark.parametrize("make", [os.mkfifo, _zeros, _holes, Path.mkdir])
 @pytest.mark.parametrize(
     ("name", "read"),

@@ -6,6 +6,7 @@ import contextlib
 import errno
 import fcntl
 import os
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
@@ -20,19 +21,25 @@ def paths_of(paths: str | Path | Iterable[str | Path]) -> list[Path]:
 MOST_BYTES = 1 << 26
 """Of settings, cards and records, the largest of which are a few megabytes."""
 
+_PASSED = re.compile(r"/dev/stdin|/(dev|proc/self)/fd/\d+")
+
 
 def read_whole(path: Path, most_bytes: int = MOST_BYTES) -> bytes:
-    """The content of a file of at most so many bytes. FsidError where it is larger or cannot be read."""
-    check_file(path)
+    """The content of a file of at most so many bytes, or of what the shell passes, as for `<(command)`.
+
+    FsidError where it is larger or cannot be read.
+    """
+    if not _PASSED.fullmatch(str(path)):
+        check_file(path)
     try:
         with path.open("rb") as file:
-            if os.fstat(file.fileno()).st_size > most_bytes:
-                raise FsidError(
-                    f"{path}: is more than {most_bytes >> 20} MiB, too large for what it should be"
-                )
-            return file.read()
+            is_small = os.fstat(file.fileno()).st_size <= most_bytes
+            data = file.read(most_bytes + 1) if is_small else b""
     except OSError as error:
         raise FsidError(f"{path}: cannot be read ({error.strerror})") from None
+    if not is_small or len(data) > most_bytes:
+        raise FsidError(f"{path}: is more than {most_bytes >> 20} MiB, too large for what it should be")
+    return data
 
 
 def check_file(path: Path) -> None:
