@@ -22,6 +22,7 @@ MOST_BYTES = 1 << 26
 """Of settings, cards and records, the largest of which are a few megabytes."""
 
 _PASSED = re.compile(r"/dev/stdin|/(dev|proc/self)/fd/\d+")
+"""Descriptors of this process: pipes that whoever started it asked for."""
 
 
 def read_whole(path: Path, most_bytes: int = MOST_BYTES) -> bytes:

@@ -121,16 +121,16 @@ def generate(
     out, count, workforce = Path(out), operator.index(count), workforce or Workforce(workers)
     dataset = dataset_config(config, seed, shard_size)
     with _locked(out):
-        if not _check_own(out, dataset):
+        begun, todo = _check_own(out, dataset), list(_missing(out, dataset, count))
+        if todo or not begun:
             check_card(out)
+        if not begun:
             save_settings(dataset, out / "config.yaml")
-        todo = list(_missing(out, dataset, count))
         total = sum(len(shard.indices) for shard in todo)
         done = count - total
         progress(done, count)
         tasks_per_worker = max(1, SAMPLES_PER_WORKER // dataset.shard_size)
         if todo:
-            check_card(out)
             _withdraw_card(out)
             for _, made in run(workforce.crew(len(todo)), todo, tasks_per_worker=tasks_per_worker, lost=lost):
                 done += made

@@ -32,9 +32,7 @@ def lamps_of(
         if drawable.object_id == BACKGROUND_ID:
             continue
         for part, material in enumerate(drawable.materials):
-            if material.emission <= 0:
-                continue
-            if part not in drawable.mesh.face_parts:
+            if material.emission <= 0 or part not in drawable.mesh.face_parts:
                 continue
             centroid, area = _extent(drawable, part)
             rotation, position = drawable.pose(time_s)
@@ -65,6 +63,7 @@ def _hood_apart(drawable: Drawable) -> list[Drawable]:
 
 
 def _is_hood(drawable: Drawable, part: int, lamps: Sequence[tuple[np.ndarray, float]]) -> bool:
+    """Whether a part keeps off the spheres of all lamps, as of `_extent`, and lets no light through."""
     material = drawable.materials[part]
     if material.emission > 0 or material.translucency > 0 or material.transmission >= CLEAR:
         return False

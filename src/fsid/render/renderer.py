@@ -218,13 +218,14 @@ class Renderer:
         most, places = self._quality.shots, self._lens_images
         shots = shots_of(camera, view.drawables, frame, shot, self._label_sample, most, places)
         radiance = frame.radiance
+        focal_px = _focal_px(camera) if camera.aperture_m > 0 else 0.0
         if len(shots) == 1:
-            radiance = _through_lens(shots[0], camera, radiance, frame.depth)
+            radiance = _through_lens(shots[0], camera, focal_px, radiance, frame.depth)
         elif shots:
             radiance = np.zeros_like(radiance)
             for part in shots:
                 self._draw(view, part, bake, mark)
-                radiance += _through_lens(part, camera, *self._targets.read_radiance())
+                radiance += _through_lens(part, camera, focal_px, *self._targets.read_radiance())
             radiance /= np.float32(len(shots))
         radiance = magnified(radiance, asked, margin)
         set_sharpness(radiance, asked)
@@ -324,11 +325,16 @@ class Renderer:
             self._context.finish()
 
 
-def _through_lens(shot: Shot, camera: Camera, radiance: np.ndarray, depth: np.ndarray) -> np.ndarray:
-    """An image as the part of the lens that `shot` stands for shows it."""
+def _focal_px(camera: Camera) -> float | np.ndarray:
+    """Focal length in pixels; (H, W) where the lens bends the image."""
+    focal_px = float(lens_of(camera).focal[0]) * camera.width / 2
+    return focal_px if camera.distortion is None else focal_px * stretch_of(camera.distortion, camera)
+
+
+def _through_lens(
+    shot: Shot, camera: Camera, focal_px: float | np.ndarray, radiance: np.ndarray, depth: np.ndarray
+) -> np.ndarray:
+    """An image as the part of the lens that `shot` stands for shows it. focal_px: of the camera."""
     if shot.aperture_m == 0:
         return radiance
-    focal_px: float | np.ndarray = shot.lens.focal[0] * camera.width / 2
-    if camera.distortion is not None:
-        focal_px = focal_px * stretch_of(camera.distortion, camera)
     return defocus(radiance, depth, shot.aperture_m, camera.focus_m, focal_px)
