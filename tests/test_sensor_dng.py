@@ -391,28 +391,36 @@ def test_a_truncated_file_is_named(tmp_path):
             read_raw(tmp_path / "short.dng")
 
 
-def write_tiles(path, *tiles):
-    """A DNG 32 high whose tiles, 64 wide, hold those bytes."""
-    places = np.cumsum([0, *map(len, tiles)])[:-1]
+PLAIN, JPEG = (259, SHORT, (1,)), (259, SHORT, (7,))
+TILES_64 = (322, LONG, (64,)), (323, LONG, (32,))
+
+
+def write_parts(path, parts, *layout, size, tiles=False, gap=0):
+    """A DNG of `size` (height, width) whose strips or tiles hold those bytes, `gap` bytes apart."""
+    offsets, sizes = (324, 325) if tiles else (273, 279)
     tags = [
-        (256, LONG, (64 * len(tiles),)),
-        (257, LONG, (32,)),
+        (256, LONG, size[1:]),
+        (257, LONG, size[:1]),
         (258, SHORT, (16,)),
-        (259, SHORT, (7,)),
         (262, SHORT, (CFA,)),
         (277, SHORT, (1,)),
-        (322, LONG, (64,)),
-        (323, LONG, (32,)),
-        (325, LONG, tuple(map(len, tiles))),
+        (sizes, LONG, tuple(map(len, parts))),
         (33421, SHORT, (2, 2)),
         (33422, BYTE, bytes((0, 1, 1, 2))),
         (50706, BYTE, bytes((1, 4, 0, 0))),
         (50708, ASCII, b"Some camera\0"),
+        *layout,
     ]
-    for start in (0, len(tiff_bytes(Directory(tuple(Tag(*tag) for tag in (*tags, (324, LONG, (0, 0)))))))):
-        offsets = (324, LONG, tuple(int(place) + start for place in places))
-        data = tiff_bytes(Directory(tuple(Tag(*tag) for tag in (*tags, offsets))))
-    path.write_bytes(data + b"".join(tiles))
+    places = np.cumsum([0, *(len(part) + gap for part in parts)])[:-1]
+    for start in (0, len(tiff_bytes(Directory(tuple(Tag(*t) for t in (*tags, (offsets, LONG, places))))))):
+        found = (offsets, LONG, tuple(int(place) + start for place in places))
+        data = tiff_bytes(Directory(tuple(Tag(*t) for t in (*tags, found))))
+    path.write_bytes(data + bytes(gap).join(parts))
+
+
+def write_tiles(path, *tiles):
+    """A DNG 32 high whose tiles, 64 wide, hold those bytes."""
+    write_parts(path, tiles, JPEG, *TILES_64, size=(32, 64 * len(tiles)), tiles=True)
 
 
 GREY_JPEG = b"".join(
@@ -440,6 +448,34 @@ def test_zeros_for_compressed_pixels_are_a_broken_copy(tmp_path, kept):
     write_tiles(tmp_path / "a.dng", GREY_JPEG, GREY_JPEG[:kept] + bytes(5000 - kept))
     with pytest.raises(FsidError, match=r"a\.dng: corrupt.*copy it again"):
         read_raw(tmp_path / "a.dng")
+
+
+DN = np.arange(32 * 40, dtype="<u2").reshape(32, 40)
+STRIPS, TILE = [DN[:16].tobytes(), DN[16:].tobytes()], [np.pad(DN, ((0, 0), (0, 24))).tobytes()]
+ROWS_16, ROWS_32 = (278, LONG, (16,)), (278, LONG, (32,))
+
+
+@pytest.mark.parametrize(
+    ("kind", "parts", "layout", "laid"),
+    [
+        (None, STRIPS, [PLAIN, ROWS_16], {}),
+        ("strips", STRIPS, [PLAIN, ROWS_16], {"gap": 2}),
+        ("strips", [GREY_JPEG] * 2, [JPEG, ROWS_32], {"size": (64, 64)}),
+        ("a tile wider", TILE, [PLAIN, *TILES_64], {"tiles": True}),
+        ("a tile wider", [GREY_JPEG] * 2, [JPEG, *TILES_64], {"size": (64, 60), "tiles": True}),
+        ("interleaved", STRIPS, [PLAIN, ROWS_16, (50975, SHORT, (2,))], {}),
+        ("interleaved", STRIPS, [PLAIN, ROWS_16, (52547, SHORT, (2,))], {}),
+    ],
+)
+def test_pixels_that_libraw_would_look_for_elsewhere_are_refused(tmp_path, kind, parts, layout, laid):
+    """It reads strips from the first one on, of JPEG strips the first, and no more than the width."""
+    path = tmp_path / "a.dng"
+    write_parts(path, parts, *layout, **{"size": DN.shape, **laid})
+    if kind is None:
+        np.testing.assert_array_equal(read_stored(path).dn, DN)
+    else:
+        with pytest.raises(FsidError, match=rf"a\.dng: holds its pixels in {kind}"):
+            read_raw(path)
 
 
 @settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -25,7 +25,7 @@ from fsid.sensor.bare import BARE_SUFFIXES
 from fsid.sensor.black_levels import BlackLevels
 from fsid.sensor.colour import published_matrices
 from fsid.sensor.embedded import embedded_directories
-from fsid.sensor.intact import check_intact
+from fsid.sensor.intact import check_intact, check_order
 from fsid.sensor.metadata import Metadata, kept_metadata, libraw_metadata, taken
 from fsid.sensor.mosaic import CFA_PATTERNS
 from fsid.sensor.quantise import to_dn
@@ -222,6 +222,8 @@ def _read_source(file: BinaryIO, path: Path) -> _Source:
     if path.suffix.lower() in BARE_SUFFIXES and not described:  # LibRaw guesses
         raise FsidError(f"{path}: is a bare mosaic: write it as DNG first, see docs/capture-a-test-set.md")
     check_intact(file, mosaic, path)
+    if dng_tags.DNG_VERSION in values:
+        check_order(mosaic, path)
     if SAMPLE_FORMAT in mosaic and mosaic[SAMPLE_FORMAT].values == (_FLOATING_POINT,):
         raise FsidError(
             f"{path}: holds floating-point pixels, which LibRaw scales by a factor that it does not tell; "

@@ -3,6 +3,10 @@
 A copy that broke off leaves a file short, or zeros in the place of pixels. Zeros tell nothing in uncompressed
 pixels. A lossless JPEG begins with the marker SOI, and ends with EOI, after which writers may pad with zeros;
 some cut EOI off (Leica M10), so that only zeros without it are a broken copy.
+
+LibRaw also takes for granted where the pixels of a DNG lie: strips one after the other (of lossless JPEGs it
+reads the first alone), a lone tile or JPEG no wider than the image, rows and columns in their order. It makes
+a scrambled or half black image of what lies elsewhere.
 """
 
 from __future__ import annotations
@@ -12,12 +16,24 @@ from pathlib import Path
 from typing import BinaryIO
 
 from fsid.errors import FsidError
-from fsid.sensor.tiff import COMPRESSION, STRIP_OFFSETS, STRIP_SIZES, TILE_OFFSETS, TILE_SIZES, Tag
+from fsid.sensor.tiff import (
+    BITS,
+    COMPRESSION,
+    ROWS_PER_STRIP,
+    STRIP_OFFSETS,
+    STRIP_SIZES,
+    TILE_OFFSETS,
+    TILE_SIZES,
+    TILE_WIDTH,
+    WIDTH,
+    Tag,
+)
 
 LOSSLESS_JPEG = 7  # compression of TIFF
 _SOI, _EOI = b"\xff\xd8", b"\xff\xd9"
 _SECTOR_BYTES = 512  # the least that a broken copy lacks
 _LONGEST_PADDING = 1 << 16
+_REORDERED = (50974, 50975, 52547)  # DNG: SubTileBlockSize, RowInterleaveFactor, ColumnInterleaveFactor
 
 
 def check_intact(file: BinaryIO, directory: Mapping[int, Tag], path: Path) -> None:
@@ -34,6 +50,27 @@ def check_intact(file: BinaryIO, directory: Mapping[int, Tag], path: Path) -> No
                     raise FsidError(
                         f"{path}: corrupt, its pixels at byte {place:.0f} are missing or zeros; copy it again"
                     )
+
+
+def check_order(directory: Mapping[int, Tag], path: Path) -> None:
+    """FsidError where the pixels of a DNG's `directory` lie otherwise than LibRaw reads them."""
+
+    def first(code: int) -> float:
+        return next(iter(directory[code].values), 0) if code in directory else 0
+
+    strips, tiles = (directory[c].values if c in directory else () for c in (STRIP_OFFSETS, TILE_OFFSETS))
+    step = first(ROWS_PER_STRIP) * -(-first(WIDTH) * first(BITS) // 8)
+    is_apart = any(place != strips[0] + number * step for number, place in enumerate(strips))
+    is_jpeg = first(COMPRESSION) == LOSSLESS_JPEG
+    if len(strips) > 1 and (is_apart or is_jpeg):
+        kind = "strips, which are compressed or lie apart"
+    elif first(TILE_WIDTH) > first(WIDTH) and (is_jpeg or len(tiles) == 1):
+        kind = "a tile wider than the image"
+    elif any(n != 1 for code in _REORDERED if code in directory for n in directory[code].values):
+        kind = "interleaved rows or columns"
+    else:
+        return
+    raise FsidError(f"{path}: holds its pixels in {kind}; LibRaw misreads that: store them in one strip")
 
 
 def _is_jpeg(file: BinaryIO, place: int, length: int) -> bool:

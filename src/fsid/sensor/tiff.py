@@ -21,6 +21,7 @@ BYTE, ASCII, SHORT, LONG, RATIONAL, SRATIONAL, DOUBLE = 1, 2, 3, 4, 5, 10, 12
 SUB_IFD, EXIF_IFD = 330, 34665
 COMPRESSION, PHOTOMETRIC, SAMPLE_FORMAT = 259, 262, 339
 STRIP_OFFSETS, STRIP_SIZES, TILE_OFFSETS, TILE_SIZES = 273, 279, 324, 325
+WIDTH, BITS, ROWS_PER_STRIP, TILE_WIDTH = 256, 258, 278, 322
 RGB, CFA = 2, 32803  # photometric interpretations
 
 Values = tuple[float, ...] | bytes  # numbers (numerator, denominator, ... of rationals), or bytes and text
