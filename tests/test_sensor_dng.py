@@ -255,6 +255,13 @@ def test_black_levels_and_crop_count_from_the_active_area(tmp_path, top, left):
         assert tuple(file.pages.first.tags[50719].value) == (2, 2)
 
 
+def test_a_dng_without_an_active_area_is_read_whole_whatever_its_camera(tmp_path):
+    """LibRaw cuts the last rows off what a Leica SL2 made."""
+    raw = replace(_raw(), mosaic=np.tile(_raw().mosaic, (2, 2)), camera="Leica SL2")
+    write_dng(tmp_path / "a.dng", raw)
+    np.testing.assert_array_equal(read_raw(tmp_path / "a.dng").mosaic, quantise(raw).mosaic)
+
+
 def test_black_levels_of_rows_and_columns_are_subtracted(tmp_path):
     """BlackLevelDeltaV and H, from the first pixel of an odd active area on, and 5 DN of light everywhere."""
     rows, columns = np.arange(33) % 7 - 3.5, np.arange(41) % 5 - 1.0

@@ -29,6 +29,7 @@ def libraw(pattern: np.ndarray | None = BAYER, **said) -> SimpleNamespace:
         "color_desc": b"RGBG",
         "raw_pattern": pattern,
         "raw_colors_visible": tile[rows % len(tile), columns % len(tile)],
+        "raw_image": dn,
         "raw_image_visible": dn,
         "black_level_per_channel": [512] * 4,
         "white_level": 16383,

@@ -269,12 +269,13 @@ def _visible(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The image without its masked margins, and LibRaw's colours of its first 2x2 pixels.
 
-    LibRaw starts at even pixels; what a DNG says of pixels counts from where its ActiveArea starts.
+    LibRaw starts at even pixels, and cuts rows off for some cameras; what a DNG says of pixels counts from
+    where its ActiveArea starts.
     """
-    area = dng_tags.active_area(tags)
+    height, width = file.raw_image.shape
+    area = dng_tags.active_area(tags, (height, width))
     if area is not None:
         top, left, bottom, right = area
-        height, width = file.raw_image.shape
         moved = max(abs(file.sizes.top_margin - top), abs(file.sizes.left_margin - left))
         if moved <= 1 and bottom <= height and right <= width:
             return file.raw_image[top:bottom, left:right], np.roll(pattern, (-top, -left), axis=(0, 1))

@@ -22,8 +22,10 @@ from fsid.sensor.raw import NoiseLevel, Raw
 from fsid.sensor.tiff import (
     ASCII,
     BYTE,
+    CFA,
     DOUBLE,
     LONG,
+    PHOTOMETRIC,
     RATIONAL,
     SHORT,
     SRATIONAL,
@@ -157,10 +159,12 @@ def date_taken(tags: Tags) -> str:
     return day if re.fullmatch(r"\d{4}-\d\d-\d\d", day) else ""
 
 
-def active_area(tags: Tags) -> tuple[int, int, int, int] | None:
-    """(top, left, bottom, right) of a DNG's pixels that saw light; None where `tags` state no such area."""
-    area = _numbers(tags, ACTIVE_AREA)
-    if DNG_VERSION not in tags or len(area) != 4 or not all(0 <= edge <= MAX_SIDE for edge in area):
+def active_area(tags: Tags, shape: tuple[int, int]) -> tuple[int, int, int, int] | None:
+    """(top, left, bottom, right) of a DNG's pixels that saw light: of all, (height, width), where it states
+    no area. None where `tags` are not of a DNG's mosaic, or state an area that cannot be."""
+    area = _numbers(tags, ACTIVE_AREA) or (0, 0, *shape)
+    is_mosaic = DNG_VERSION in tags and _numbers(tags, PHOTOMETRIC) == (CFA,)
+    if not is_mosaic or len(area) != 4 or not all(0 <= edge <= MAX_SIDE for edge in area):
         return None
     top, left, bottom, right = map(int, area)
     return (top, left, bottom, right) if top < bottom and left < right else None
