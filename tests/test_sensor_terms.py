@@ -362,6 +362,16 @@ def test_values_below_black_stay_below_it():
     assert noise.mean() == pytest.approx(0, abs=5e-4)
 
 
+@pytest.mark.parametrize("poisson", [False, True])
+def test_a_pixel_without_gain_has_read_noise_alone(poisson):
+    """A third of them, where a gain pattern of more than 1 (as one is, in percent) is asked for."""
+    noisy = stack(NoiseTerms(prnu=2.3, poisson=poisson), x=0.5, frames=8) + 0.5
+    dead = noisy.mean(axis=0) < 0.02
+    assert np.isfinite(noisy).all()
+    assert dead.mean() == pytest.approx(1 / 3, abs=0.02)
+    assert noisy.var(axis=0, ddof=1)[dead].mean() == pytest.approx(LEVEL.sigma2[0], rel=0.1)
+
+
 def test_each_unit_has_defects_of_its_own_and_keeps_them():
     level, terms = NoiseLevel(k=(1e-12,) * 4, sigma2=(1e-12,) * 4), NoiseTerms(defective=0.1)
     exposures = [

@@ -82,6 +82,7 @@ def add_noise_terms(
     if terms.prnu:
         light *= 1 + np.float32(terms.prnu) * _pattern(unit, 0, shape)
     light += k * np.float32(terms.dark_current_e_s * exposure_s)
+    np.maximum(light, 0, out=light)  # a strong pattern leaves some pixels without gain, none with less
     if terms.poisson:
         noisy = poisson(shot, light / k).astype(np.float32) * k
     else:
