@@ -19,11 +19,11 @@ from fsid.sensor.tiff import ASCII, RATIONAL, SHORT, Tag, quotients, rationals
 ORIENTATION, EXPOSURE_TIME, F_NUMBER, FOCAL_LENGTH, LENS_MODEL = 274, 33434, 33437, 37386, 42036
 DATE_TAKEN = 36867
 CROP_ORIGIN, CROP_SIZE = 50719, 50720
-COLOUR_MATRICES = frozenset((50721, 50722, 50723, 50724, 50725, 50726, 50778, 50779, 50964, 50965))
+COLOUR_MATRICES = frozenset((*range(50721, 50728), 50778, 50779, 50964, 50965))  # and their analog balance
 
 # Description, make, model, orientation, date, artist, copyright; DNG: camera, colour, lens, profile.
 _FIRST = frozenset((270, 271, 272, ORIENTATION, 306, 315, 33432, 50707, 50708, 50709)) | COLOUR_MATRICES
-_FIRST |= frozenset((50727, 50730, 50731, 50732, 50734, 50735, 50736, 50739, 50931, 50932))
+_FIRST |= frozenset((50730, 50731, 50732, 50734, 50735, 50736, 50739, 50931, 50932))
 _FIRST |= frozenset((*range(50936, 50943), 50981, 50982, 51107, 51108, 51109, 51110))
 # Crop, green split, chroma blur, anti-alias, scale; lens corrections that converters apply to linear data.
 _MOSAIC = frozenset((CROP_ORIGIN, CROP_SIZE, 50718, 50733, 50737, 50738, 50780, 51009, 51022, 51125))
