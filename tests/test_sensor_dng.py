@@ -289,6 +289,28 @@ def test_fractions_of_a_black_level_are_kept(tmp_path):
     np.testing.assert_allclose(dn, expected, atol=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("repeat", "levels", "level"),
+    [
+        ((1, 1), (64,) * 4, 64),
+        ((2, 2), (64,), 64),
+        ((1, 1), (64, 65, 66, 64), None),
+        ((2, 2), (64, 65), None),
+    ],
+)
+def test_black_levels_that_fit_no_pattern_are_one_or_refused(tmp_path, repeat, levels, level):
+    """As where somebody writes four and forgets BlackLevelRepeatDim, which is 1 x 1 then."""
+    tags = [(50714, "H", len(levels), levels if len(levels) > 1 else levels[0])]
+    if repeat != (1, 1):
+        tags.append((50713, "H", 2, repeat))
+    write_with_black(tmp_path / "a.dng", np.full((32, 40), 70, np.uint16), *tags)
+    if level is None:
+        with pytest.raises(FsidError, match=r"a\.dng: its \d numbers of BlackLevel fit no"):
+            read_raw(tmp_path / "a.dng")
+    else:
+        assert read_raw(tmp_path / "a.dng").black_level == level
+
+
 def test_stored_integers_are_moved_by_whole_dn_and_never_fall_together(tmp_path):
     """Blacks of 60, 64.5, 68 and 75.5 DN about their mean, 67; what is at 0 or white stays there."""
     levels = (50714, "2I", 4, (60, 1, 129, 2, 68, 1, 151, 2))

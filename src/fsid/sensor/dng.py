@@ -254,7 +254,7 @@ def _stored(file: rawpy.RawPy, tags: dict[int, Values], path: Path) -> Stored:
     """The pixels are in LibRaw's memory."""
     dn, colours = _visible(file, _pattern(file, path), tags)
     cfa = _cfa(file, colours, path)
-    black = _black_levels(file, colours, tags, dn.shape)
+    black = _black_levels(file, colours, tags, dn.shape, path)
     dn = dn[: dn.shape[0] - dn.shape[0] % 2, : dn.shape[1] - dn.shape[1] % 2]
     if dn.size == 0:
         raise FsidError(f"{path}: is smaller than one 2x2 tile of its filter pattern")
@@ -283,10 +283,10 @@ def _visible(
 
 
 def _black_levels(
-    file: rawpy.RawPy, colours: np.ndarray, tags: dict[int, Values], shape: tuple[int, int]
+    file: rawpy.RawPy, colours: np.ndarray, tags: dict[int, Values], shape: tuple[int, int], path: Path
 ) -> BlackLevels:
     """What a DNG's tags say, else what LibRaw says of each colour; shape: of the active area."""
-    tile = dng_tags.black_tile(tags)
+    tile = dng_tags.black_tile(tags, path)
     if tile is None:
         levels = np.asarray(file.black_level_per_channel, np.float64)
         return BlackLevels(levels[colours], np.zeros(shape[0]), np.zeros(shape[1]))

@@ -12,11 +12,13 @@ from __future__ import annotations
 
 import json
 import re
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from fsid.config import to_plain
+from fsid.errors import FsidError
 from fsid.sensor.metadata import COLOUR_MATRICES, DATE_TAKEN, EXPOSURE_TIME, ORIENTATION, merged
 from fsid.sensor.raw import NoiseLevel, Raw
 from fsid.sensor.tiff import (
@@ -170,17 +172,28 @@ def active_area(tags: Tags, shape: tuple[int, int]) -> tuple[int, int, int, int]
     return (top, left, bottom, right) if top < bottom and left < right else None
 
 
-def black_tile(tags: Tags) -> np.ndarray | None:
-    """(rows, columns) black levels in DN that repeat from the first pixel of the active area on; None where
-    `tags` are not a DNG's, or state none that fit their pattern."""
+def black_tile(tags: Tags, path: Path) -> np.ndarray | None:
+    """(rows, columns) black levels in DN that repeat from the first pixel of the active area on.
+
+    None where `tags` are not a DNG's, or state none. Equal ones are one, however many. FsidError, naming
+    `path`, where others do not fit their pattern.
+    """
     values = list(_numbers(tags, BLACK_LEVEL))
     repeat = _numbers(tags, BLACK_REPEAT) or (1, 1)
-    if DNG_VERSION not in tags or len(repeat) != 2 or not all(1 <= n <= MAX_REPEAT for n in repeat):
-        return None
-    rows, columns = int(repeat[0]), int(repeat[1])
+    fits = len(repeat) == 2 and all(1 <= n <= MAX_REPEAT for n in repeat)
+    rows, columns = map(int, repeat) if fits else (0, 0)
     if len(values) == 2 * rows * columns:
         values = quotients(values)
-    return np.array(values, np.float64).reshape(rows, columns) if len(values) == rows * columns else None
+    if DNG_VERSION not in tags or not values:
+        return None
+    if len(values) == rows * columns:
+        return np.array(values, np.float64).reshape(rows, columns)
+    if len(set(values)) == 1:
+        return np.full((1, 1), values[0])
+    raise FsidError(
+        f"{path}: its {len(values)} numbers of BlackLevel fit no BlackLevelRepeatDim of "
+        f"{' x '.join(f'{n:g}' for n in repeat)}; correct these tags"
+    )
 
 
 def black_deltas(tags: Tags, code: int, length: int) -> np.ndarray:
