@@ -452,16 +452,22 @@ def write_tiles(path, *tiles):
     write_parts(path, tiles, JPEG, *TILES_64, size=(32, 64 * len(tiles)), tiles=True)
 
 
-GREY_JPEG = b"".join(
-    (
+def grey_jpeg(components: int) -> bytes:
+    """A lossless JPEG of 32 x 64 values of 16 bits, all 32768."""
+    frame = b"".join(bytes((component, 17, 0)) for component in range(components))
+    scan = b"".join(bytes((component, 0)) for component in range(components))
+    parts = (
         b"\xff\xd8",
         b"\xff\xc4\x00\x14\x00" + bytes((1, *15 * (0,), 0)),  # one code, 0: no difference to the last pixel
-        b"\xff\xc3\x00\x0b\x10" + bytes((0, 32, 0, 64, 1, 0, 17, 0)),  # 16 bits, 32 x 64, one component
-        b"\xff\xda\x00\x08\x01" + bytes((0, 0, 1, 0, 0)),
+        b"\xff\xc3\x00" + bytes((8 + len(frame), 16, 0, 32, 0, 64 // components, components)) + frame,
+        b"\xff\xda\x00" + bytes((6 + len(scan), components)) + scan + bytes((1, 0, 0)),
         bytes(32 * 64 // 8),
         b"\xff\xd9",
     )
-)
+    return b"".join(parts)
+
+
+GREY_JPEG = grey_jpeg(1)
 
 
 @pytest.mark.parametrize("last", [GREY_JPEG, GREY_JPEG + b"\0", GREY_JPEG + bytes(5000), GREY_JPEG[:-1]])
@@ -470,6 +476,12 @@ def test_a_compressed_file_is_read_whatever_follows_its_end(tmp_path, last):
     raw = read_raw(tmp_path / "a.dng")
     assert raw.mosaic.shape == (32, 128)
     np.testing.assert_allclose(raw.mosaic, 32768 / 65535)
+
+
+def test_three_tiles_of_two_components_are_read(tmp_path):
+    """Of two, which fill the width, LibRaw would read each row twice as long as it is."""
+    write_tiles(tmp_path / "a.dng", *[grey_jpeg(2)] * 3)
+    np.testing.assert_allclose(read_raw(tmp_path / "a.dng").mosaic, np.full((32, 192), 32768 / 65535))
 
 
 @pytest.mark.parametrize("kept", [0, 1, 60])
@@ -492,6 +504,7 @@ ROWS_16, ROWS_32 = (278, LONG, (16,)), (278, LONG, (32,))
         ("strips", [GREY_JPEG] * 2, [JPEG, ROWS_32], {"size": (64, 64)}),
         ("a tile wider", TILE, [PLAIN, *TILES_64], {"tiles": True}),
         ("a tile wider", [GREY_JPEG] * 2, [JPEG, *TILES_64], {"size": (64, 60), "tiles": True}),
+        ("JPEGs of 2", [grey_jpeg(2)] * 2, [JPEG, *TILES_64], {"size": (32, 128), "tiles": True}),
         ("interleaved", STRIPS, [PLAIN, ROWS_16, (50975, SHORT, (2,))], {}),
         ("interleaved", STRIPS, [PLAIN, ROWS_16, (52547, SHORT, (2,))], {}),
     ],

@@ -223,7 +223,7 @@ def _read_source(file: BinaryIO, path: Path) -> _Source:
         raise FsidError(f"{path}: is a bare mosaic: write it as DNG first, see docs/capture-a-test-set.md")
     check_intact(file, mosaic, path)
     if dng_tags.DNG_VERSION in values:
-        check_order(mosaic, path)
+        check_order(file, mosaic, path)
     if SAMPLE_FORMAT in mosaic and mosaic[SAMPLE_FORMAT].values == (_FLOATING_POINT,):
         raise FsidError(
             f"{path}: holds floating-point pixels, which LibRaw scales by a factor that it does not tell; "

@@ -5,8 +5,8 @@ pixels. A lossless JPEG begins with the marker SOI, and ends with EOI, after whi
 some cut EOI off (Leica M10), so that only zeros without it are a broken copy.
 
 LibRaw also takes for granted where the pixels of a DNG lie: strips one after the other (of lossless JPEGs it
-reads the first alone), a lone tile or JPEG no wider than the image, rows and columns in their order. It makes
-a scrambled or half black image of what lies elsewhere.
+reads the first alone), a lone tile or JPEG no wider than the image, rows and columns in their order; and n
+JPEGs of n components that fill the width confuse it. It makes a scrambled or half black image of such.
 """
 
 from __future__ import annotations
@@ -30,7 +30,8 @@ from fsid.sensor.tiff import (
 )
 
 LOSSLESS_JPEG = 7  # compression of TIFF
-_SOI, _EOI = b"\xff\xd8", b"\xff\xd9"
+_SOI, _SOF3, _EOI = b"\xff\xd8", b"\xff\xc3", b"\xff\xd9"
+_LONGEST_HEADER = 1 << 12
 _SECTOR_BYTES = 512  # the least that a broken copy lacks
 _LONGEST_PADDING = 1 << 16
 _REORDERED = (50974, 50975, 52547)  # DNG: SubTileBlockSize, RowInterleaveFactor, ColumnInterleaveFactor
@@ -52,7 +53,7 @@ def check_intact(file: BinaryIO, directory: Mapping[int, Tag], path: Path) -> No
                     )
 
 
-def check_order(directory: Mapping[int, Tag], path: Path) -> None:
+def check_order(file: BinaryIO, directory: Mapping[int, Tag], path: Path) -> None:
     """FsidError where the pixels of a DNG's `directory` lie otherwise than LibRaw reads them."""
 
     def first(code: int) -> float:
@@ -68,9 +69,23 @@ def check_order(directory: Mapping[int, Tag], path: Path) -> None:
         kind = "a tile wider than the image"
     elif any(n != 1 for code in _REORDERED if code in directory for n in directory[code].values):
         kind = "interleaved rows or columns"
+    elif is_jpeg and (n := _components(file, first(TILE_OFFSETS), first(WIDTH))) > 1:
+        kind = f"JPEGs of {n} components, {n} of which fill its width"
     else:
         return
     raise FsidError(f"{path}: holds its pixels in {kind}; LibRaw misreads that: store them in one strip")
+
+
+def _components(file: BinaryIO, place: float, image_width: float) -> int:
+    """Of the lossless JPEG there, where as many JPEGs of its width fill that of the image; else 0."""
+    size = file.seek(0, 2)
+    data, at = _read(file, int(place), _LONGEST_HEADER) if 0 <= place < size else b"", len(_SOI)
+    while at + 10 <= len(data):
+        if data[at : at + 2] == _SOF3:
+            width, components = int.from_bytes(data[at + 7 : at + 9], "big"), data[at + 9]
+            return components if width * components**2 == image_width else 0
+        at += 2 + int.from_bytes(data[at + 2 : at + 4], "big")
+    return 0
 
 
 def _is_jpeg(file: BinaryIO, place: int, length: int) -> bool:
