@@ -9,9 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.spatial import cKDTree
+from scipy.spatial import ConvexHull, cKDTree
 
 from fsid.assets import PART_KINDS, Mesh, build_mesh, mesh_families, part_kind, registry
+from fsid.assets.solids import Solid
+from fsid.assets.streams import rng_of
 from fsid.errors import FsidError
 
 REPOSITORY = Path(__file__).resolve().parents[1]
@@ -178,6 +180,40 @@ def test_the_law_against_coincident_faces_can_fail():
     assert fighting_share(two(np.array((0.3, 0.2, 0.001)))) == 0
     assert fighting_share(two(np.array((1.0, 0.0, 0.0)))) == 0
     assert fighting_share(two(np.array((0.3, 0.2, 0.0)), flip=True)) == 0
+
+
+def solids_of(family: str, seed: int) -> dict[str, list[Solid]]:
+    """The solids of each part, before they are one mesh."""
+    build_mesh(family, seed)  # fills the registry
+    return {name: list(group) for name, group in registry._MESHES[family](rng_of(family, seed)).items()}
+
+
+HEAPS = {
+    "fruit": ("peel",),
+    "bowl": ("peel",),
+    "dice": ("plastic_dice",),
+    "coins": ("metal_coins", "metal_other"),
+    "mushrooms": ("peel_cap",),
+    "bolts": ("metal_bolts", "metal_nuts", "metal_washers"),
+    "polyhedron": ("glass_gem", "stone"),
+    "seashells": ("ceramic_spirals", "ceramic_fans"),
+    "springs": ("metal",),
+}
+"""Families of bodies that lie beside or on each other, and the parts that are such bodies."""
+
+
+@pytest.mark.parametrize("family", HEAPS)
+def test_bodies_of_a_heap_do_not_enter_each_other(family):
+    """No vertex of one lies in the convex hull of another."""
+    for seed in range(8):
+        parts = solids_of(family, seed)
+        bodies = [solid.vertices for name in HEAPS[family] for solid in parts.get(name, [])]
+        hulls = [ConvexHull(points).equations for points in bodies]
+        for i, points in enumerate(bodies):
+            for j, planes in enumerate(hulls):
+                if i != j:
+                    depth = -(points @ planes[:, :3].T + planes[:, 3]).max(1)
+                    assert depth.max() < 1e-5, (family, seed, i, j)
 
 
 def test_a_scene_of_forty_objects_is_light_and_quick():

@@ -7,11 +7,12 @@ loft      skin over closed cross sections, flat ends
 squared   circles into superellipses |x|^p + |y|^p = 1
 fluted    flutes around z, twisted
 scatter_rand, sunflower    places on the floor and directions on the ball
+spread    bodies beside each other, none inside another
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -136,6 +137,28 @@ def scatter_rand(rng: np.random.Generator, count: int, gap: float) -> np.ndarray
     k = np.arange(count)
     radius, angle = gap * 0.55 * np.sqrt(k * 1.6), 2.4 * k + rng.uniform(0, 6.3)
     return np.c_[radius * np.cos(angle), radius * np.sin(angle)] + rng.normal(0, 0.06 * gap, (count, 2))
+
+
+def spread(groups: Sequence[Sequence[Solid]], spots: np.ndarray) -> list[list[Solid]]:
+    """Each group of solids at its spot (n, 2), or farther out from the origin where another is in its way:
+    seen from above, circles around the groups do not overlap."""
+    placed: list[list[Solid]] = []
+    circles: list[tuple[np.ndarray, float]] = []
+    for group, spot in zip(groups, spots, strict=True):
+        points = np.concatenate([s.vertices[:, :2] for s in group])
+        middle = (points.min(0) + points.max(0)) / 2
+        radius = 1.005 * float(np.hypot(*(points - middle).T).max())
+        far = float(np.hypot(*spot))
+        way = spot / far if far > 1e-9 else np.array((1.0, 0.0))
+        while True:
+            hit = [(c, r + radius) for c, r in circles if np.hypot(*(far * way - c)) < 0.9999 * (r + radius)]
+            if not hit:
+                break
+            far = max(float(way @ c + np.sqrt((way @ c) ** 2 - c @ c + reach**2)) for c, reach in hit)
+        circles.append((far * way, radius))
+        x, y = far * way - middle
+        placed.append([s.at(float(x), float(y)) for s in group])
+    return placed
 
 
 def sunflower(count: int) -> np.ndarray:

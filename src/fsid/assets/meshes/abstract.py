@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fsid.assets.forms import loft, plate, turns_to
+from fsid.assets.forms import loft, plate, spread, turns_to
 from fsid.assets.registry import Parts, mesh_family
 from fsid.assets.solids import (
     Solid,
@@ -130,7 +130,7 @@ def polyhedron(rng: np.random.Generator) -> Parts:
     """Random convex bodies with flat faces: cut gems, boulders of glass, building stones."""
     from scipy.spatial import ConvexHull
 
-    bodies = []
+    lying, spots = [], []
     for k in range(int(rng.integers(1, 4))):
         count = int(rng.choice((6, 9, 16, 40)))
         points = rng.normal(size=(count, 3))
@@ -143,7 +143,9 @@ def polyhedron(rng: np.random.Generator) -> Parts:
         corners[flip] = corners[flip][:, ::-1]
         faces = np.arange(3 * len(corners)).reshape(-1, 3)
         solid = Solid(corners.reshape(-1, 3), smooth_normals(corners.reshape(-1, 3), faces), faces)
-        bodies.append(solid.resting().at(0.14 * k, 0.06 * (k % 2)))
+        lying.append([solid.resting()])
+        spots.append((0.14 * k, 0.06 * (k % 2)))
+    bodies = [body for (body,) in spread(lying, np.array(spots))]
     return {"glass_gem": bodies[:1], "stone": bodies[1:]} if len(bodies) > 1 else {"glass_gem": bodies}
 
 

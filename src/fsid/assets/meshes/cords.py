@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fsid.assets.forms import spread
 from fsid.assets.registry import Parts, mesh_family
 from fsid.assets.solids import Solid, ball, box, copies, cylinder, lathe, rotation_matrix, sweep
 
@@ -165,7 +166,7 @@ def chain(rng: np.random.Generator) -> Parts:
 @mesh_family("springs")
 def springs(rng: np.random.Generator) -> Parts:
     """Helical springs: cylindrical, conical or barrel-shaped, standing, lying or bent."""
-    solids = []
+    solids, spots = [], []
     for k in range(int(rng.integers(1, 5))):
         radius, tall, turns = rng.uniform(0.01, 0.03), rng.uniform(0.04, 0.12), int(rng.integers(4, 12))
         wire = min(rng.uniform(0.001, 0.0035), 0.3 * tall / turns)
@@ -178,8 +179,9 @@ def springs(rng: np.random.Generator) -> Parts:
         spring = sweep(path + np.c_[bow, 0 * bow, 0 * bow], wire, 8)
         if rng.random() < 0.5:
             spring = spring.turned(x_deg=90).turned(z_deg=rng.uniform(0, 360))
-        solids.append(spring.resting().at(0.07 * (k % 2), 0.08 * (k // 2)))
-    return {"metal": solids}
+        solids.append([spring.resting()])
+        spots.append((0.07 * (k % 2), 0.08 * (k // 2)))
+    return {"metal": [spring for (spring,) in spread(solids, np.array(spots))]}
 
 
 @mesh_family("beads")

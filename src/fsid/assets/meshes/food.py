@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fsid.assets.forms import plate, scatter_rand, sunflower, turns_to
+from fsid.assets.forms import plate, scatter_rand, spread, sunflower, turns_to
 from fsid.assets.registry import Parts, mesh_family
 from fsid.assets.solids import Solid, ball, ball_directions, copies, cylinder, lathe, sweep
 from fsid.assets.surfaces import smooth_normals
@@ -16,15 +16,15 @@ def fruit(rng: np.random.Generator) -> Parts:
     count = int(rng.integers(1, 7))
     size = rng.uniform(0.03, 0.06)
     spots = scatter_rand(rng, count, 2.5 * size)
-    bodies, stems = [], []
+    fruits = []
     pear = rng.uniform(-0.1, 0.45) * (rng.random() < 0.5)
     stem = sweep(np.array([(0, 0, 0.6), (0.05, 0.02, 1.05), (0.16, 0.05, 1.35)]) * size, 0.0018, 8)
-    for dx, dy in spots:
+    for _ in spots:
         lean = rng.normal(0, 25, 2)
         body = round_fruit(rng, size * rng.uniform(0.8, 1.1), pear).turned(*lean)
         lift = -float(body.vertices[:, 2].min())
-        bodies.append(body.at(dx, dy, lift))
-        stems.append(stem.at(z=0.35 * pear * size).turned(*lean).at(dx, dy, lift))
+        fruits.append((body.at(z=lift), stem.at(z=0.35 * pear * size).turned(*lean).at(z=lift)))
+    bodies, stems = zip(*spread(fruits, spots), strict=True)
     return {"peel": bodies, "wood_stems": stems}
 
 
@@ -139,13 +139,12 @@ def bramble(rng: np.random.Generator) -> Parts:
     grain = size * 1.75 / np.sqrt(drupes)
     berry = copies(ball(grain, 1), turns_to(d), d * (size - 0.4 * grain))
     core = ball(size * 0.72, 1).stretched(1, 1, 1.2)
-    berries, cores, calyx = [], [], []
-    for dx, dy in scatter_rand(rng, count, 2.3 * size):
-        turn = rng.uniform(0, 360, 3)
-        lift = float(berry.turned(*turn).vertices[:, 2].min())
-        berries.append(berry.turned(*turn).at(dx, dy, -lift))
-        cores.append(core.turned(*turn).at(dx, dy, -lift))
-        calyx.append(_calyx(size).turned(*turn).at(dx, dy, -lift))
+    spots = scatter_rand(rng, count, 2.3 * size)
+    heap = []
+    for turn in rng.uniform(0, 360, (count, 3)):
+        lift = -float(berry.turned(*turn).vertices[:, 2].min())
+        heap.append([part.turned(*turn).at(z=lift) for part in (berry, core, _calyx(size))])
+    berries, cores, calyx = zip(*spread(heap, spots), strict=True)
     return {"peel": berries + cores, "leaf_calyx": calyx}
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fsid.assets.forms import scatter_rand, sunflower
+from fsid.assets.forms import scatter_rand, spread, sunflower
 from fsid.assets.registry import Parts, mesh_family
 from fsid.assets.solids import (
     Solid,
@@ -66,13 +66,13 @@ def dice(rng: np.random.Generator) -> Parts:
             places.append(spin @ np.array((0.26 * size * u, 0.26 * size * v, 0.5 * size)))
     cube = box(size, size, size, size * rng.uniform(0.08, 0.3), 4).at(z=-size / 2)
     pips = copies(pip, np.array(turns), np.array(places))
-    bodies: list[Solid] = []
-    dots: list[Solid] = []
-    for x, y in scatter_rand(rng, int(rng.integers(1, 6)), 1.9 * size):
+    spots = scatter_rand(rng, int(rng.integers(1, 6)), 1.9 * size)
+    rolled = []
+    for _ in spots:
         a_deg, b_deg, c_deg = 90.0 * rng.integers(0, 4, 3)
         c_deg += rng.uniform(0, 360)
-        for bits, part in ((bodies, cube), (dots, pips)):
-            bits.append(part.turned(a_deg, b_deg, c_deg).at(x, y, size / 2))
+        rolled.append([part.turned(a_deg, b_deg, c_deg).at(z=size / 2) for part in (cube, pips)])
+    bodies, dots = zip(*spread(rolled, spots), strict=True)
     return {"plastic_dice": bodies, "pips": dots}
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fsid.assets.forms import loft, scatter_rand, sunflower, turns_to
+from fsid.assets.forms import loft, scatter_rand, spread, sunflower, turns_to
 from fsid.assets.meshes.plants import leaf_rand
 from fsid.assets.registry import Parts, mesh_family
 from fsid.assets.solids import (
@@ -28,7 +28,8 @@ def stones(rng: np.random.Generator) -> Parts:
     level = 4 if count < 4 else 3
     d = ball_directions(level)
     out, stacked, z = [], rng.random() < 0.25, 0.0
-    for x, y in scatter_rand(rng, count, 1.7 * size):
+    spots = scatter_rand(rng, count, 1.7 * size)
+    for _ in spots:
         planes = rng.normal(size=(int(rng.integers(8, 30)), 3))
         planes /= np.linalg.norm(planes, axis=1, keepdims=True)
         facing = np.clip(d @ planes.T, 1e-3, None)
@@ -41,8 +42,8 @@ def stones(rng: np.random.Generator) -> Parts:
             out.append(stone.at(*rng.normal(0, 0.06 * size, 2)))
         else:
             stone = stone.stretched(1, 1, rng.uniform(0.5, 1)).turned(*rng.uniform(0, 360, 3))
-            out.append(stone.resting().at(x, y))
-    return {"stone": out}
+            out.append(stone.resting())
+    return {"stone": out if stacked else [s for (s,) in spread([[s] for s in out], spots)]}
 
 
 @mesh_family("crystals")
@@ -66,8 +67,9 @@ def crystals(rng: np.random.Generator) -> Parts:
 @mesh_family("seashells")
 def seashells(rng: np.random.Generator) -> Parts:
     """Spiral shells and ribbed scallops, after the logarithmic spiral."""
-    spirals, fans = [], []
-    for x, y in scatter_rand(rng, int(rng.integers(1, 4)), 0.09):
+    spots = scatter_rand(rng, int(rng.integers(1, 4)), 0.09)
+    shells, kinds = [], []
+    for _ in spots:
         if rng.random() < 0.6:
             turns, growth = rng.uniform(2.5, 5), rng.uniform(0.16, 0.3)
             a = np.linspace(0, 2 * np.pi * turns, int(22 * turns))
@@ -76,20 +78,24 @@ def seashells(rng: np.random.Generator) -> Parts:
             path = size * scale[:, None] * np.c_[np.cos(a), np.sin(a), np.full(len(a), -pitch)]
             ribs = 1 + rng.uniform(0, 0.15) * np.abs(np.sin(a * rng.uniform(3, 9)))
             tube = sweep(path, size * scale * ribs * rng.uniform(0.55, 0.75), 14)
-            spirals.append(tube.turned(*rng.uniform(0, 360, 3)).resting().at(x, y))
+            kinds.append("ceramic_spirals")
+            shells.append([tube.turned(*rng.uniform(0, 360, 3)).resting()])
         else:
-            fans.append(
-                _scallop(rng, rng.uniform(0.02, 0.04)).turned(z_deg=rng.uniform(0, 360)).resting().at(x, y)
-            )
-    named = {"ceramic_spirals": spirals, "ceramic_fans": fans}
-    return {name: solids for name, solids in named.items() if solids}
+            fan = _scallop(rng, rng.uniform(0.02, 0.04))
+            kinds.append("ceramic_fans")
+            shells.append([fan.turned(z_deg=rng.uniform(0, 360)).resting()])
+    parts: dict[str, list[Solid]] = {"ceramic_spirals": [], "ceramic_fans": []}
+    for kind, (shell,) in zip(kinds, spread(shells, spots), strict=True):
+        parts[kind].append(shell)
+    return {name: solids for name, solids in parts.items() if solids}
 
 
 @mesh_family("pine_cones")
 def pine_cones(rng: np.random.Generator) -> Parts:
     """Cones of scales in golden-angle spirals, open or closed."""
     cones = []
-    for x, y in scatter_rand(rng, int(rng.integers(1, 3)), 0.07):
+    spots = scatter_rand(rng, int(rng.integers(1, 3)), 0.07)
+    for _ in spots:
         count, length, wide = int(rng.integers(50, 90)), rng.uniform(0.05, 0.1), rng.uniform(0.017, 0.03)
         k = np.arange(count) / count
         girth = np.sin(np.pi * (0.12 + 0.86 * k) ** 0.75)
@@ -103,9 +109,9 @@ def pine_cones(rng: np.random.Generator) -> Parts:
         core = lathe([(0, 0), *np.c_[0.3 * wide * girth, length * k][::6], (0, length)], 12)
         solid = copies(scale, np.array(turns), np.array(places))
         turn = rng.uniform(0, 360, 3) if rng.random() < 0.6 else np.zeros(3)
-        for part in (solid, core):
-            cones.append(part.turned(*turn).at(x, y, -float(solid.turned(*turn).vertices[:, 2].min())))
-    return {"wood_scales": cones}
+        lift = -float(solid.turned(*turn).vertices[:, 2].min())
+        cones.append([part.turned(*turn).at(z=lift) for part in (solid, core)])
+    return {"wood_scales": [part for cone in spread(cones, spots) for part in cone]}
 
 
 @mesh_family("logs")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fsid.assets.forms import fluted, hollow, loft, scatter_rand, squared, sunflower, turns_to
+from fsid.assets.forms import fluted, hollow, loft, scatter_rand, spread, squared, sunflower, turns_to
 from fsid.assets.registry import Parts, mesh_family
 from fsid.assets.solids import (
     Solid,
@@ -200,13 +200,14 @@ def mushrooms(rng: np.random.Generator) -> Parts:
     """Group of caps on stalks, with gills below and sometimes warts above."""
     count, size = int(rng.integers(1, 5)), rng.uniform(0.025, 0.06)
     open_, point = rng.uniform(0.35, 1.0), rng.uniform(0.7, 2.0)
-    parts: tuple[list[Solid], ...] = ([], [], [], [])
+    group = []
     s = np.linspace(0, 1, 14)
     fin = sheet(
         np.stack(np.meshgrid(np.linspace(0.15, 0.93, 4), (-0.16, 0.0)), -1)[..., [0, 0, 1]] * (1, 0, 1), 0.02
     )
     spokes = np.array([rotation_matrix(z_deg=k * 15) for k in range(24)])
-    for x, y in scatter_rand(rng, count, 1.5 * size):
+    spots = scatter_rand(rng, count, 1.5 * size)
+    for _ in spots:
         r, tall, lean = size * rng.uniform(0.5, 1.1), size * rng.uniform(1.1, 2.6), rng.normal(0, 7, 2)
         dome = np.c_[np.cos(s * np.pi / 2) ** point, open_ * np.sin(s * np.pi / 2)]
         cap = lathe([(0, -0.02), (0.96, -0.04), (1.0, -0.01), *dome[1:-1], (0, open_)], 30, 50)
@@ -217,10 +218,10 @@ def mushrooms(rng: np.random.Generator) -> Parts:
             z=tall - 0.02 * r
         )
         d = sunflower(40)[23:38]
-        spots = np.c_[d[:, :2], d[:, 2] * open_] * r * 0.99
-        dots = copies(ball(0.05 * r, 1).stretched(1, 1, 0.5), turns_to(d), spots).at(z=tall)
-        for bits, part in zip(parts, (head, stem, fan, dots), strict=True):
-            bits.append(part.turned(*lean).at(x, y))
+        on_cap = np.c_[d[:, :2], d[:, 2] * open_] * r * 0.99
+        dots = copies(ball(0.05 * r, 1).stretched(1, 1, 0.5), turns_to(d), on_cap).at(z=tall)
+        group.append([part.turned(*lean) for part in (head, stem, fan, dots)])
+    parts = zip(*spread(group, spots), strict=True)
     named = dict(zip(("peel_cap", "stalk", "gills", "warts"), parts, strict=True))
     return named if rng.random() < 0.5 else {name: named[name] for name in ("peel_cap", "stalk", "gills")}
 

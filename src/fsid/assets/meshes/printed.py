@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from itertools import chain
+
 import numpy as np
 
-from fsid.assets.forms import plate, scatter_rand, slab
+from fsid.assets.forms import plate, scatter_rand, slab, spread
 from fsid.assets.registry import Parts, mesh_family
 from fsid.assets.solids import (
     Solid,
@@ -21,16 +23,22 @@ def coins(rng: np.random.Generator) -> Parts:
     """Coins in two metals, stacked and spilled: raised rim, milled edge, a relief on each face."""
     parts: dict[str, list[Solid]] = {"metal_coins": [], "metal_other": []}
     kinds = [_coin_rand(rng) for _ in range(3)]
-    for stack, (x, y) in enumerate(scatter_rand(rng, int(rng.integers(3, 9)), 0.036)):
-        z = 2e-5 * stack
+    spots = scatter_rand(rng, int(rng.integers(3, 9)), 0.036)
+    stacks: list[list[Solid]] = []
+    names: list[str] = []
+    for _ in spots:
+        z, stack = 0.0, []
         for _ in range(1 if rng.random() < 0.6 else int(rng.integers(2, 4))):
             k = int(rng.integers(3))
             radius, thick, coin = kinds[k]
             flip = 180.0 * rng.integers(2)
             placed = coin.turned(x_deg=flip).turned(z_deg=rng.uniform(0, 360)).resting(z)
-            dx, dy = rng.normal(0, 0.05 * radius, 2)
-            parts["metal_coins" if k else "metal_other"].append(placed.at(x + dx, y + dy))
+            stack.append(placed.at(*rng.normal(0, 0.05 * radius, 2)))
+            names.append("metal_coins" if k else "metal_other")
             z += thick + 2e-5
+        stacks.append(stack)
+    for name, coin in zip(names, chain(*spread(stacks, spots)), strict=True):
+        parts[name].append(coin)
     return {name: solids for name, solids in parts.items() if solids}
 
 

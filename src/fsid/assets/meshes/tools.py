@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fsid.assets.forms import loft, plate, scatter_rand, slab
+from fsid.assets.forms import loft, plate, scatter_rand, slab, spread
 from fsid.assets.registry import Parts, mesh_family
 from fsid.assets.solids import Solid, box, cylinder, join, lathe, sweep, tubes
 
@@ -167,13 +167,18 @@ def bolts(rng: np.random.Generator) -> Parts:
     count, radius = int(rng.integers(3, 9)), rng.uniform(0.003, 0.006)
     bolt, nut, washer = _bolt(rng, radius), _nut(radius), _washer(radius)
     parts: dict[str, list[Solid]] = {"metal_bolts": [], "metal_nuts": [], "metal_washers": []}
-    for k, (x, y) in enumerate(scatter_rand(rng, count, 9 * radius)):
+    spots = scatter_rand(rng, count, 9 * radius)
+    spilled, names = [], []
+    for k in range(count):
         name, solid = list(zip(parts, (bolt, nut, washer), strict=True))[k % 3]
         lying = (
             90 - np.degrees(np.arcsin(0.06)) if solid is bolt else rng.choice((0.0, 90.0)) * (solid is nut)
         )
         placed = solid.turned(z_deg=rng.choice((0, 60))).turned(x_deg=lying).turned(z_deg=rng.uniform(0, 360))
-        parts[name].append(placed.resting().at(x, y))
+        spilled.append([placed.resting()])
+        names.append(name)
+    for name, (solid,) in zip(names, spread(spilled, spots), strict=True):
+        parts[name].append(solid)
     return parts
 
 

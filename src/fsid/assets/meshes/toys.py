@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from itertools import chain
+
 import numpy as np
 
-from fsid.assets.forms import fluted, plate, scatter_rand, slab
+from fsid.assets.forms import fluted, plate, scatter_rand, slab, spread
 from fsid.assets.registry import Parts, mesh_family
 from fsid.assets.solids import (
     Solid,
@@ -23,15 +25,22 @@ def toy_blocks(rng: np.random.Generator) -> Parts:
     """Cubes, bars, cylinders, cones and arches of a building set, in towers and scattered."""
     parts: tuple[list[Solid], ...] = ([], [], [])
     size = rng.uniform(0.03, 0.06)
-    for tower, (x, y) in enumerate(scatter_rand(rng, int(rng.integers(2, 6)), 2.6 * size)):
-        z = 0.0004 * tower
+    spots = scatter_rand(rng, int(rng.integers(2, 6)), 2.6 * size)
+    towers: list[list[Solid]] = []
+    colours: list[int] = []
+    for _ in spots:
+        z, tower = 0.0, []
         for _ in range(int(rng.integers(1, 6))):
             block, tall = _block_rand(rng, size)
             dx, dy = rng.normal(0, 0.08, 2) * size
-            parts[rng.integers(3)].append(block.turned(z_deg=rng.uniform(0, 360)).at(x + dx, y + dy, z))
+            colours.append(int(rng.integers(3)))
+            tower.append(block.turned(z_deg=rng.uniform(0, 360)).at(dx, dy, z))
             z += tall + 0.0002
             if tall == 0.0:
                 break
+        towers.append(tower)
+    for colour, block in zip(colours, chain(*spread(towers, spots)), strict=True):
+        parts[colour].append(block)
     named = zip(("wood_blocks", "wood_second", "wood_third"), parts, strict=True)
     return {name: solids for name, solids in named if solids}
 

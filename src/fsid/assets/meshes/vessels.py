@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from fsid.assets.forms import fluted, hollow, scatter_rand, squared
+from fsid.assets.forms import fluted, hollow, scatter_rand, spread, squared
 from fsid.assets.meshes.food import round_fruit
 from fsid.assets.registry import Parts, mesh_family
 from fsid.assets.solids import Solid, ball, cone, cylinder, join, lathe, sweep
@@ -116,11 +116,14 @@ def bowl(rng: np.random.Generator) -> Parts:
         spots = scatter_rand(rng, count, 1.7 * size)
         spots *= min(1.0, 0.5 * radius / np.hypot(*spots.T).max())
         fruits = [round_fruit(rng, size * rng.uniform(0.8, 1.1)) for _ in spots]
+        spread_out = [fruit for (fruit,) in spread([[fruit] for fruit in fruits], spots)]
+        spots = np.array([(f.vertices[:, :2].min(0) + f.vertices[:, :2].max(0)) / 2 for f in spread_out])
         x = np.linspace(0, 1, 9)
         beside = np.clip((np.hypot(*spots.T)[:, None] + 1.2 * size * x) / radius - 0.35, 0, 0.65) / 0.65
         touch = depth * beside ** (1 / curve) + 1.2 * size * np.sqrt(1 - x * x)
         lift = 0.012 + wall + touch.max(1)
-        parts["peel"] = [f.at(dx, dy, z) for f, (dx, dy), z in zip(fruits, spots, lift, strict=True)]
+        fits = np.hypot(*spots.T) < radius - 0.9 * size
+        parts["peel"] = [f.at(z=z) for f, z, fit in zip(spread_out, lift, fits, strict=True) if fit]
     return parts
 
 
