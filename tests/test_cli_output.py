@@ -72,6 +72,37 @@ def test_a_full_disk_under_the_output_is_one_line(arguments: list[str]) -> None:
     assert (ended.returncode, ended.stderr) == (2, "fsid: No space left on device\n")
 
 
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no device that is always full")
+def test_a_full_disk_under_standard_error_leaves_the_exit_code() -> None:
+    """As of `fsid ... 2> log`: neither a refusal nor a note can be told."""
+    for arguments in (["profiles", "none"], ["doctor"]):
+        with open("/dev/full", "wb") as full:
+            ended = subprocess.run(
+                [sys.executable, "-c", NOTE, *arguments], stdout=subprocess.DEVNULL, stderr=full
+            )
+        assert ended.returncode == 2, arguments
+
+
+def test_a_closed_pipe_under_standard_error_is_told_by_the_exit_code() -> None:
+    """A refusal stays one; what cannot print how far it is ends as where its output is closed."""
+    for arguments, code in ((["profiles", "none"], 2), (["doctor"], 141)):
+        read, write = os.pipe()
+        os.close(read)
+        ended = subprocess.run(
+            [sys.executable, "-c", NOTE, *arguments], stdout=subprocess.DEVNULL, stderr=write
+        )
+        os.close(write)
+        assert ended.returncode == code, arguments
+
+
+NOTE = """
+import fsid.cli.main as cli
+from fsid.terminal import Terminal
+cli.COMMANDS["doctor"] = lambda: Terminal(stderr=True).print("a note")
+cli.main()
+"""
+
+
 @pytest.mark.parametrize("arguments", ["--help", "profiles", "profiles --help"])
 def test_a_closed_output_does_not_fail_a_command(arguments: str) -> None:
     """As `fsid ... >&-`, or a job without one."""

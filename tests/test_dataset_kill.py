@@ -157,24 +157,51 @@ def test_sigterm_leaves_nothing_half_written(tiny: list[str], tmp_path: Path, wo
     assert [path.name for path in tmp_path.iterdir()] == ["config.yaml"]
 
 
-def test_sigterm_takes_a_half_made_test_set_away(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129)])
+def test_a_signal_takes_a_half_made_test_set_away(tmp_path: Path, number: int, code: int) -> None:
+    """SIGHUP: of a terminal that is closed, or a connection that is lost."""
     (tmp_path / "photos").mkdir()
     picture = Image.fromarray(np.random.default_rng(0).integers(0, 255, (512, 512, 3), np.uint8))
     for i in range(40):
         picture.save(tmp_path / "photos" / f"{i}.png")
     command = ["testset", "photos", str(tmp_path / "photos"), "-o", str(tmp_path / "set"), "--quiet"]
-    ended = terminated(command, (tmp_path / "set" / ".testset.part").exists)
-    assert ended == (143, "fsid: terminated")
+    ended = terminated(command, (tmp_path / "set" / ".testset.part").exists, number)
+    assert ended == (code, "fsid: terminated")
     assert [path.name for path in tmp_path.iterdir()] == ["photos"]
 
 
-def terminated(arguments: list[str], begun: Callable[[], object]) -> tuple[int, str]:
-    """Exit code and output of `fsid ARGUMENTS`, sent SIGTERM when it has begun."""
+def test_what_nohup_started_outlives_its_terminal(tiny: list[str], tmp_path: Path) -> None:
+    command = [
+        "nohup",
+        sys.executable,
+        "-m",
+        "fsid",
+        "generate",
+        str(tmp_path),
+        "--count",
+        "96",
+        "--seed",
+        "3",
+    ]
+    process = subprocess.Popen(
+        [*command, "--set", *tiny], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    while not (tmp_path / "config.yaml").exists():
+        assert process.poll() is None
+        time.sleep(0.01)
+    process.send_signal(signal.SIGHUP)
+    assert process.wait() == 0
+
+
+def terminated(
+    arguments: list[str], begun: Callable[[], object], number: int = signal.SIGTERM
+) -> tuple[int, str]:
+    """Exit code and output of `fsid ARGUMENTS`, sent a signal when it has begun."""
     process = subprocess.Popen([sys.executable, "-m", "fsid", *arguments], stderr=subprocess.PIPE)
     while not begun():
         assert process.poll() is None, process.communicate()
         time.sleep(0.01)
-    process.terminate()
+    process.send_signal(number)
     return process.wait(), " ".join(process.communicate()[1].decode().split())
 
 

@@ -6,6 +6,8 @@ escape sequence say: it clears itself, changes its title, or hides what was prin
 
 from __future__ import annotations
 
+import errno
+import os
 import re
 from collections.abc import Iterable
 
@@ -19,6 +21,10 @@ _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 
 class Terminal(Console):
     """rich's console, which styles by sequences of its own."""
+
+    def on_broken_pipe(self) -> None:
+        """Raised as what it is, where rich would exit with code 1."""
+        raise BrokenPipeError(errno.EPIPE, os.strerror(errno.EPIPE))
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
         """As it comes from rich, with what is text made harmless."""

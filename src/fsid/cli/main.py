@@ -16,6 +16,7 @@ from types import FrameType
 from typing import NoReturn, TextIO
 
 import tyro
+from rich.text import Text
 
 from fsid import __version__
 from fsid.cli import (
@@ -59,7 +60,10 @@ COMMANDS: dict[str, Callable[..., None]] = {
 DESCRIPTION = "RAW denoisers trained on nothing but rendered scenes: generate pairs, train, denoise, prove."
 RESUMABLE = {"generate", "train", "experiment", "demo"}
 REPEATABLE = {"--model"}  # of evaluate
+ENDING = (signal.SIGTERM, signal.SIGHUP)
+"""Of Slurm and `docker stop`, and of a terminal or a connection that is closed."""
 FULL = (errno.ENOSPC, errno.EDQUOT)
+CLOSED = (errno.EPIPE, errno.EIO)  # what a pipe says without its reader, and a terminal that is gone
 SYMLINK_LOOP = "Symlink loop"  # how the RuntimeError of Path.resolve begins
 EXTRAS = {
     "torch": "train",
@@ -74,33 +78,39 @@ EXTRAS = {
 
 
 class _Terminated(KeyboardInterrupt):
-    """SIGTERM, as of Slurm and `docker stop`: cleans up as after Ctrl-C."""
+    """A signal of ENDING: cleans up as after Ctrl-C."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__()
+        self.code = 128 + number
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run one command, in the main thread; exit code 0 when done, 2 for bad input or a full disk, 130 after
-    Ctrl-C, 143 after SIGTERM, 141 when nobody reads on."""
+    Ctrl-C, 143 after SIGTERM, 129 after SIGHUP, 141 when nobody reads on."""
     _open_closed()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # a file's name may be no text in its encoding
             stream.reconfigure(errors="backslashreplace")
-    before = signal.signal(signal.SIGTERM, _terminate)
+    heeded = [number for number in ENDING if signal.getsignal(number) != signal.SIG_IGN]  # nohup ignores one
+    before = {number: signal.signal(number, _terminate) for number in heeded}
     try:
         try:
             _run(arguments)
         finally:
             sys.stdout.flush()
     except OSError as error:
-        is_closed = isinstance(error, BrokenPipeError) and not _is_read(sys.stdout)
+        is_closed = error.errno in CLOSED and not (_is_read(sys.stdout) and _is_read(sys.stderr))
         if not is_closed and error.errno not in FULL:
             raise
-        with suppress(OSError, ValueError):  # Python flushes once more at its end
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _silence(sys.stdout)
         if is_closed:
+            _silence(sys.stderr)
             sys.exit(141)
         _fail(os.strerror(error.errno or 0))
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _open_closed() -> None:
@@ -117,8 +127,9 @@ def _open_closed() -> None:
 
 
 def _terminate(number: int, frame: FrameType | None) -> None:
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # a second one must not end the cleaning up
-    raise _Terminated
+    for ending in ENDING:
+        signal.signal(ending, signal.SIG_IGN)  # a second one must not end the cleaning up
+    raise _Terminated(number)
 
 
 def _run(arguments: Sequence[str] | None) -> None:
@@ -154,10 +165,12 @@ def _run(arguments: Sequence[str] | None) -> None:
             raise
         _fail(str(error))
     except KeyboardInterrupt as signalled:
-        what, code = ("terminated", 143) if isinstance(signalled, _Terminated) else ("interrupted", 130)
+        what, code = (
+            ("terminated", signalled.code) if isinstance(signalled, _Terminated) else ("interrupted", 130)
+        )
         goes_on = set(sys.argv[1:2] if arguments is None else arguments[:1]) & RESUMABLE
         hint = "; the same command goes on from what is finished" if goes_on else ""
-        Terminal(stderr=True).print(f"fsid: {what}{hint}")
+        _tell(Text(f"fsid: {what}{hint}"))
         sys.exit(code)
 
 
@@ -189,5 +202,19 @@ def _check_repeated(arguments: Sequence[str]) -> None:
 
 
 def _fail(line: str) -> NoReturn:
-    Terminal(stderr=True).print(error_line(line), soft_wrap=True)
+    _tell(error_line(line))
     sys.exit(2)
+
+
+def _tell(line: Text) -> None:
+    """Print `line` on standard error; where that is full or closed, the exit code alone says it."""
+    try:
+        Terminal(stderr=True).print(line, soft_wrap=True)
+    except OSError:
+        _silence(sys.stderr)
+
+
+def _silence(stream: TextIO) -> None:
+    """Send what is left in `stream` to nowhere: Python flushes once more at its end."""
+    with suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
