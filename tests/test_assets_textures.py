@@ -280,6 +280,14 @@ def test_displacement_gets_its_range_from_the_normal_map(folder):
     assert maps.relief_m == pytest.approx(np.ptp(hill()[0]) * maps.tile_m, rel=0.03)
 
 
+@pytest.mark.parametrize("size", [64, SIZE, 2 * SIZE])
+def test_values_of_an_exr_beyond_one_are_one(tmp_path, size):
+    """Where the picture is as large as the tile nothing is resampled; 1.004 came out as a mirror."""
+    save(tmp_path / "a_diff_1k.png", picture())
+    save_exr(tmp_path / "a_rough_1k.exr", np.full((SIZE, SIZE), 1.004), "Y")
+    assert bake_material(f"file:{tmp_path}", 0, size).roughness.min() == 1
+
+
 def test_directx_normals_are_turned_over():
     _, normal = hill()
     other = normal * (1, -1, 1) + (0, 1, 0)

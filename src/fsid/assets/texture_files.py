@@ -208,7 +208,7 @@ def resampled(image: np.ndarray, size: int) -> np.ndarray:
         image = np.tile(image, (max(1, width // height), max(1, height // width), 1))
         height, width = image.shape[:2]
     if (height, width) == (size, size):
-        return image
+        return np.clip(image, 0.0, 1.0)
     pad = (min(4 * (height // size + 1), height), min(4 * (width // size + 1), width))
     box = (pad[1], pad[0], pad[1] + width, pad[0] + height)
     out = np.empty((size, size, image.shape[2]), np.float32)
