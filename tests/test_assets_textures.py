@@ -280,6 +280,46 @@ def test_displacement_gets_its_range_from_the_normal_map(folder):
     assert maps.relief_m == pytest.approx(np.ptp(hill()[0]) * maps.tile_m, rel=0.03)
 
 
+@pytest.mark.parametrize("size", [64, 256])
+def test_a_fine_displacement_gets_its_range_too(tmp_path, size):
+    """Slopes of few texels, which differences of neighbours do not show, are in normal maps."""
+    height = noise(np.random.default_rng(3), 512, 1.6)
+    height = 0.01 * (height - height.min()) / np.ptp(height)
+    waves = 2j * np.pi * np.fft.fftfreq(512, 1 / 512)
+    du, dv = (np.real(np.fft.ifft2(np.fft.fft2(height) * w)) for w in (waves[None], waves[:, None]))
+    normal = np.stack([-du, dv, np.ones_like(du)], axis=-1)
+    save(tmp_path / "a_Color.png", picture())
+    save(tmp_path / "a_NormalGL.png", (normal / np.linalg.norm(normal, axis=-1, keepdims=True) + 1) / 2)
+    save(tmp_path / "a_Displacement.png", np.uint16(height * 6_553_500))
+    maps = bake_material(f"file:{tmp_path}", 0, size)
+    seen, truth = maps.height * maps.relief_m, height.reshape(size, 512 // size, size, -1).mean((1, 3))
+    assert np.std(seen) == pytest.approx(np.std(truth) * TILE_M, rel=0.03)
+
+
+@pytest.mark.parametrize("suffix", ["png", "exr"])
+def test_a_displacement_alone_has_the_same_metres_at_every_size(tmp_path, suffix):
+    """A lone needle a hundredth of a tile wide: of few texels little is left, and no taller ones are made."""
+    height = np.zeros((256, 256))
+    height[100:103, 50:53] = 1.0
+    save(tmp_path / "a_diff_1k.png", picture())
+    if suffix == "exr":
+        save_exr(tmp_path / "a_disp_1k.exr", 40 * height - 7, "Y")
+    else:
+        save(tmp_path / "a_disp_1k.png", height)
+    fine, coarse = (bake_material(f"file:{tmp_path}", 0, size) for size in (256, 64))
+    tops = fine.height.reshape(64, 4, 64, 4).mean((1, 3)) * fine.relief_m
+    assert np.ptp(coarse.height) * coarse.relief_m == pytest.approx(np.ptp(tops), rel=0.25)
+    assert fine.relief_m == pytest.approx(0.02)
+
+
+def test_a_displacement_that_hardly_varies_makes_no_mountains(tmp_path):
+    levels = np.uint8(np.rint(128 + 0.6 * noise(np.random.default_rng(0), 256, 0.3)))
+    save(tmp_path / "a_Color.png", picture())
+    save(tmp_path / "a_Displacement.png", levels)
+    maps = bake_material(f"file:{tmp_path}", 0, 256)
+    assert maps.relief_m == pytest.approx(0.02 * np.ptp(levels) / 255, rel=0.01)
+
+
 @pytest.mark.parametrize("size", [64, SIZE, 2 * SIZE])
 def test_values_of_an_exr_beyond_one_are_one(tmp_path, size):
     """Where the picture is as large as the tile nothing is resampled; 1.004 came out as a mirror."""

@@ -167,10 +167,9 @@ def decode_exr(path: Path) -> np.ndarray:
     return pixels
 
 
-def within_one(pixels: np.ndarray) -> np.ndarray:
-    """`pixels` where they lie in 0..1, else stretched to it."""
-    low, span = float(pixels.min()), float(np.ptp(pixels))
-    return pixels if low >= 0 and low + span <= 1 else (pixels - low) / np.float32(max(span, 1e-12))
+def stretched(pixels: np.ndarray) -> np.ndarray:
+    """`pixels` of any unit in 0..1."""
+    return (pixels - pixels.min()) / np.float32(max(float(np.ptp(pixels)), 1e-12))
 
 
 def _check_size(name: str, width: int, height: int) -> None:

@@ -1,7 +1,8 @@
 """Texture folders as materials: "file:PATH" -> `MaterialMaps` in the picture's own colours.
 
     colour         -> masks by the triangle of `fsid.assets.triangle`, and its three colours
-    displacement   -> height; its range in metres such that its slopes are those of the normal map
+    displacement   -> height; its range in metres such that its slopes are those of the normal map, without
+                      one 2 cm from black to white (in OpenEXR, which has any unit, of its own range)
     normal alone   -> height by integration: H = -i (fx P + fy Q) / (2 pi (fx^2 + fy^2)) of slope spectra
 
 The integration is the least-squares one of Frankot and Chellappa, "A method for enforcing integrability in
@@ -24,6 +25,7 @@ from fsid.assets.file_names import NOT_TEXT, shown
 from fsid.assets.maps import MaterialMaps
 from fsid.assets.survey import Skipped, Survey, surveyed
 from fsid.assets.texture_files import (
+    EXR_SUFFIX,
     RefusedImageError,
     TextureSet,
     decode_file,
@@ -32,7 +34,7 @@ from fsid.assets.texture_files import (
     set_at,
     sets_below,
     strangers_below,
-    within_one,
+    stretched,
 )
 from fsid.assets.triangle import Triple, enclosing, encode, srgb_to_linear
 from fsid.errors import FsidError
@@ -150,9 +152,11 @@ def _maps(found: TextureSet, data: dict[str, bytes], size: int) -> MaterialMaps:
 
     def image(role: str) -> np.ndarray:
         """(S, S, 3) as encoded."""
-        pixels = decode_file(found.files[role], data[role], size)
-        pixels = resampled(within_one(pixels) if role == "height" else pixels, size)
-        return np.broadcast_to(pixels, (size, size, 3))
+        file = found.files[role]
+        pixels = decode_file(file, data[role], size)
+        if role == "height" and file.suffix.lower() == EXR_SUFFIX:
+            pixels = stretched(pixels)
+        return np.broadcast_to(resampled(pixels, size), (size, size, 3))
 
     colours, rgb = _colour(found.files["colour"], data["colour"], size)
     mix, pattern, detail = encode(rgb, colours)
@@ -210,17 +214,21 @@ def integrated(slopes: np.ndarray) -> np.ndarray:
 
 def _height(map_: np.ndarray | None, slopes: np.ndarray | None, size: int) -> tuple[np.ndarray, float]:
     """(height 0..1, its range in tile widths)."""
-    if map_ is None and slopes is None:
-        return np.full((size, size), 0.5, np.float32), _RELIEFS[0]
-    field = map_ if map_ is not None else integrated(slopes)  # type: ignore[arg-type]
-    low, span = float(field.min()), float(np.ptp(field))
+    shape = np.zeros((size, size), np.float32) if slopes is None else integrated(slopes)
+    field = shape if map_ is None else map_
+    span = float(np.ptp(field))
     if span < 1e-6:
         return np.full((size, size), 0.5, np.float32), _RELIEFS[0]
-    height = (field - low) / np.float32(span)
+    height = (field - field.min()) / np.float32(span)
     if map_ is None:
-        return height, float(np.clip(span, *_RELIEFS))
-    if slopes is None:
-        return height, _DEFAULT_RELIEF
-    steps = [(np.roll(height, -1, a) - np.roll(height, 1, a)) * (size / 2) for a in (1, 0)]
-    measured, wanted = (float(np.sqrt(np.mean(np.square(s)))) for s in (steps, slopes))
-    return height, float(np.clip(wanted / max(measured, 1e-6), *_RELIEFS))
+        relief = span
+    elif slopes is None:
+        relief = _DEFAULT_RELIEF * span
+    else:
+        relief = _steepness(shape) / max(_steepness(height), 1e-9)
+    return height, float(np.clip(relief, *_RELIEFS))
+
+
+def _steepness(field: np.ndarray) -> float:
+    """RMS difference of texels two apart: what is finer than that counts little."""
+    return float(np.sqrt(np.mean([np.square(field - np.roll(field, 2, axis)) for axis in (0, 1)])))
