@@ -15,6 +15,7 @@ from fsid.assets import (
     material_tile_m,
 )
 from fsid.assets.material_registry import draw_material
+from fsid.assets.materials import images, sheets
 from fsid.assets.patterns import cells, level, noise, shade, stack, warp
 from fsid.errors import FsidError
 
@@ -91,6 +92,59 @@ class TestEveryFamily:
             not np.array_equal(getattr(again, name), getattr(baked[family, 2], name))
             for name in ("mix", "height")
         )
+
+
+@pytest.mark.parametrize("variant", range(MATERIAL_VARIANTS))
+def test_ribbons_go_over_and_under_across_the_border_as_inside(variant):
+    """A plain weave passes over one band, a twill over two: never over more where the tile meets itself."""
+    height = draw_material("ribbons", variant, 1024).height
+    bands = int(np.abs(np.fft.rfft(height.mean(0)))[2:100].argmax()) + 2
+    middle = (np.arange(bands) + 0.5) * 1024 / bands
+    side = (middle + 0.47 * 1024 / bands) % 1024
+
+    def at(v: np.ndarray, u: np.ndarray) -> np.ndarray:
+        return height[np.ix_(v.astype(int), u.astype(int))]
+
+    over = at(middle, side) < at(side, middle)
+    for lines in (over, over.T, ~over, ~over.T):
+        rows = ("".join("-#"[int(i)] for i in (*line, *line)) for line in lines)
+        assert max(len(run) for row in rows for run in row.split("-")) <= 1 + variant % 2
+
+
+@pytest.mark.parametrize("variant", range(MATERIAL_VARIANTS))
+def test_wallpaper_has_one_lattice_across_the_border(variant):
+    """It lies on itself where it is moved by a column and dropped by half a row."""
+    flowers = draw_material("wallpaper", variant, 256).pattern
+    misses = [np.abs(flowers - warp(flowers, 1 / n, 0.5 / n)).mean() for n in range(2, 9)]
+    assert min(misses) < 0.15 * flowers.std()
+
+
+@pytest.mark.parametrize("variant", [0, 2])
+def test_cross_stitches_repeat_with_their_colours(variant):
+    maps = draw_material("embroidery", variant, 256)
+    colour = maps.mix - maps.pattern
+    for axis in (0, 1):
+        assert np.abs(colour - np.roll(colour, 128, axis)).mean() < 0.05 * colour.std()
+
+
+@pytest.mark.parametrize(
+    ("family", "size", "limit"),
+    [("circuit_board", 1024, 0.05), ("handwriting", 256, 0), ("magazine", 256, 0), ("street_map", 256, 0)],
+)
+def test_nothing_drawn_is_cut_by_the_border(family, size, limit, monkeypatch):
+    """Words end before it, tracks go on behind it; a track that runs along it is on one side."""
+    shares = []
+
+    def averaged(image):
+        canvas = np.asarray(image, float)
+        shares.append(np.mean(np.abs(canvas[:, 0] - canvas[:, -1]) > 40))
+        return np.asarray(image.reduce(2), np.float32) / 255
+
+    for module in (images, sheets):
+        monkeypatch.setattr(module, "averaged", averaged)
+    for variant in range(MATERIAL_VARIANTS):
+        draw_material(family, variant, size)
+    assert max(shares) <= limit
 
 
 @pytest.mark.parametrize("layer", material_layers())

@@ -57,8 +57,9 @@ def magazine(rng: np.random.Generator, variant: int, size: int) -> Layers:
             _paste(image, picture_rand(rng, high // 2, wide // 2).repeat(2, 0).repeat(2, 1), x, y)
             script, y = script_rand(rng), y + high + 0.02 * step
             points = int(step * rng.uniform(0.04, 0.09))
-            title = fitted(words_rand(rng, script, 4), font_rand(rng, script, points), 0.92 * step)
-            draw.text((left + 0.04 * step, y), title, font=font_rand(rng, script, points), fill=ink)
+            face = font_rand(rng, script, points)
+            title = fitted(words_rand(rng, script, 4), face, 0.92 * step)
+            draw.text((left + 0.04 * step, y), title, font=face, fill=ink)
             columns = int(rng.integers(1, 4))
             for k in range(columns):
                 x = left + (0.04 + 0.92 * k / columns) * step

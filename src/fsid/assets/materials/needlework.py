@@ -60,7 +60,7 @@ def embroidery(rng: np.random.Generator, variant: int, size: int) -> Layers:
         chart = np.tile(np.block([[tile, tile[:, ::-1]], [tile[::-1], tile[::-1, ::-1]]]), (2, 2)) > 0.72
         stitch = chart[j % len(chart), i % len(chart)]
         cross = np.maximum(edge(0.2 - np.abs(x - y), 0, 0.12), edge(0.2 - np.abs(x + y), 0, 0.12))
-        thread, first = stitch * cross, (i // 16 + j // 16) % 2 == 0
+        thread, first = stitch * cross, (i // len(tile) + j // len(tile)) % 2 == 0
     else:
         count = (3, 4, 3, 6)[variant]
         a, b, p, q = _grid(size, count, count)
@@ -143,7 +143,7 @@ def crochet(rng: np.random.Generator, variant: int, size: int) -> Layers:
 @material_family("ribbons", tile_m=0.3, relief_m=0.004)
 def ribbons(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """Plaited bands over and under each other, each with its own stripe: straps, baskets, webbing."""
-    count = (6, 10, 8, 14)[variant]
+    count = (6, 12, 8, 16)[variant]
     x, y, i, j = _grid(size, count, count)
     x, y = x + 0 * y, y + 0 * x
     over = (i + j) % 2 == 0 if variant % 2 == 0 else (i + 2 * j) % 4 < 2

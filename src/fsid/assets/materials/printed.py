@@ -82,7 +82,7 @@ def test_chart(rng: np.random.Generator, variant: int, size: int) -> Layers:
 @material_family("wallpaper", tile_m=0.6, relief_m=0.0006)
 def wallpaper(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """Two layers of rotation-symmetric flowers on a half-drop lattice, over pinstripes, embossed."""
-    wide, count = size * 2, (4, 6, 8, 3)[variant]
+    wide, count = size * 2, (4, 6, 8, 2)[variant]
 
     def flowers(dx: float, dy: float, scale: float) -> list[Draw]:
         petals, bends = int(rng.integers(3, 9)), rng.uniform(0.15, 0.6, 3)

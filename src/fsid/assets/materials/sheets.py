@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 from PIL import ImageDraw
 
@@ -177,7 +179,8 @@ def handwriting(rng: np.random.Generator, variant: int, size: int) -> Layers:
             step = height * 0.19 * t
             up = height * tall * np.sin(t) * 0.5
             points = np.c_[x + step + slant * up + height * loop * 0.5 * np.cos(t), (row + 0.62) * pitch - up]
-            draw.line(points.ravel().tolist(), fill=255, width=int(max(2, wide / 700)), joint="curve")
+            if points[:, 0].max() < 0.98 * wide:
+                draw.line(points.ravel().tolist(), fill=255, width=int(max(2, wide / 700)), joint="curve")
             x = float(points[-1, 0]) + height * rng.uniform(0.8, 1.8)
         if rng.random() < 0.15:
             draw.line((wide * 0.2, (row + 0.5) * pitch, wide * 0.4, (row + 0.55) * pitch), fill=255, width=5)
@@ -231,7 +234,7 @@ def street_map(rng: np.random.Generator, variant: int, size: int) -> Layers:
     contour = 1 - edge(np.abs((hill * 8) % 1 - 0.5), 0.05, 0.05)
     image, draw = canvas(size)
     for _ in range(60):
-        x, y = rng.uniform(0, 0.9, 2) * 2 * size
+        x, y = np.minimum(rng.uniform(0, 0.9, 2), (0.87, 0.9)) * 2 * size
         box = (x, y, x + 0.25 * size, y + 0.04 * size)
         paragraph(rng, draw, box, int(size * rng.uniform(0.015, 0.03)), 255, script_rand(rng))
     water = edge(hill, 1.1, 0.02)
@@ -255,17 +258,16 @@ def circuit_board(rng: np.random.Generator, variant: int, size: int) -> Layers:
             reach = grid * int(rng.integers(1, 9))
             x, y = x + dx * reach, y + dy * reach
             points.append((x, y))
-        draw.line(points, fill=150, width=max(2, round(grid * 0.3)), joint="curve")
-        for px, py in (points[0], points[-1]):
-            draw.ellipse(
-                (px - 0.4 * grid, py - 0.4 * grid, px + 0.4 * grid, py + 0.4 * grid), fill=255, width=2
-            )
-            draw.ellipse((px - 0.15 * grid, py - 0.15 * grid, px + 0.15 * grid, py + 0.15 * grid), fill=60)
+        across, down = (_shifts([p[k] for p in points], grid, wide) for k in (0, 1))
+        for du, dv in itertools.product(across, down):
+            _track(draw, [(px + du, py + dv) for px, py in points], grid)
     for _ in range((10, 16, 30, 8)[variant]):
         w, h = grid * rng.integers(2, 12, 2)
         x, y = rng.uniform(0, wide - w), rng.uniform(0, wide - h)
         for leg in np.arange(x + grid / 4, x + w - grid / 4, grid / 2):
-            draw.rectangle((leg, y - grid * 0.5, leg + grid * 0.22, y + h + grid * 0.5), fill=255)
+            for dv in _shifts([y, y + h], grid, wide):
+                ends = y + dv - grid * 0.5, y + dv + h + grid * 0.5
+                draw.rectangle((leg, ends[0], leg + grid * 0.22, ends[1]), fill=255)
         chip_draw.rectangle((x, y, x + w, y + h), fill=255)
         label = (x + grid * 0.2, y + grid * 0.1, x + w - grid * 0.2, y + h)
         paragraph(rng, chip_draw, label, int(grid * 0.7), 90, "digits")
@@ -280,3 +282,16 @@ def circuit_board(rng: np.random.Generator, variant: int, size: int) -> Layers:
         height=np.clip(0.2 + 0.1 * copper + 0.1 * bare + 0.6 * (chip > 0.1), 0, 1),
         metallic=bare,
     )
+
+
+def _shifts(at: list[float], reach: float, wide: int) -> list[int]:
+    """Where a thing at these places, `reach` to both sides of them, is on the canvas, which repeats."""
+    return [s for s in (-wide, 0, wide) if max(at) + reach + s > 0 and min(at) - reach + s < wide]
+
+
+def _track(draw: ImageDraw.ImageDraw, points: list[tuple[float, float]], grid: float) -> None:
+    """A track from pad to pad."""
+    draw.line(points, fill=150, width=max(2, round(grid * 0.3)), joint="curve")
+    for px, py in (points[0], points[-1]):
+        for reach, fill in ((0.4 * grid, 255), (0.15 * grid, 60)):
+            draw.ellipse((px - reach, py - reach, px + reach, py + reach), fill=fill)
