@@ -473,6 +473,20 @@ def test_a_bad_setting_names_its_key(group, key, value):
         group(**{key: value})
 
 
+def test_a_list_does_where_two_values_or_names_are_asked_for():
+    given = SceneConfig(objects=[2, 3], mesh_families=["mug", "vase"], lights=LightConfig(count=[1, 1]))
+    meant = SceneConfig(objects=(2, 3), mesh_families=("mug", "vase"), lights=LightConfig(count=(1, 1)))
+    assert given == meant
+    assert scene(config=given) == scene(config=meant)
+
+
+@pytest.mark.parametrize("given", [{"objects": 5}, {"mesh_families": "mug"}, {"mesh_folders": "meshes"}])
+def test_one_value_is_no_list(given):
+    """A text is a list of letters for Python, and one number would fail where it is drawn from."""
+    with pytest.raises(FsidError, match=f"{next(iter(given))} = .*: give a list"):
+        SceneConfig(**given)
+
+
 def test_a_narrow_choice_of_families_is_obeyed():
     config = SceneConfig(
         mesh_families=("vase", "stool"),
