@@ -12,6 +12,7 @@ import pytest
 from scipy.spatial import ConvexHull, cKDTree
 
 from fsid.assets import PART_KINDS, Mesh, build_mesh, mesh_families, part_kind, registry
+from fsid.assets.meshes.soft import pillow
 from fsid.assets.solids import Solid
 from fsid.assets.streams import rng_of
 from fsid.errors import FsidError
@@ -195,11 +196,13 @@ HEAPS = {
     "coins": ("metal_coins", "metal_other"),
     "mushrooms": ("peel_cap",),
     "bolts": ("metal_bolts", "metal_nuts", "metal_washers"),
+    "pencils": ("shaft", "shaft_other"),
+    "scissors": ("plastic_grips",),
     "polyhedron": ("glass_gem", "stone"),
     "seashells": ("ceramic_spirals", "ceramic_fans"),
     "springs": ("metal",),
 }
-"""Families of bodies that lie beside or on each other, and the parts that are such bodies."""
+"""Families of bodies that are beside or on each other, and the parts that are such bodies."""
 
 
 @pytest.mark.parametrize("family", HEAPS)
@@ -214,6 +217,175 @@ def test_bodies_of_a_heap_do_not_enter_each_other(family):
                 if i != j:
                     depth = -(points @ planes[:, :3].T + planes[:, 3]).max(1)
                     assert depth.max() < 1e-5, (family, seed, i, j)
+
+
+def points_on(solid: Solid, step: float) -> np.ndarray:
+    """Points on all triangles, hardly farther apart than `step`: the middles of sides as they are halved."""
+    triangles, points = solid.vertices[solid.faces], [solid.vertices]
+    while len(triangles):
+        sides = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)
+        long = sides.max(1) > step
+        triangles, first = triangles[long], sides[long].argmax(1)
+        a, b, c = (triangles[np.arange(len(first)), (first + k) % 3] for k in range(3))
+        points.append((a + b) / 2)
+        triangles = np.concatenate([np.stack([a, points[-1], c], 1), np.stack([points[-1], b, c], 1)])
+    return np.concatenate(points)
+
+
+@pytest.mark.parametrize("family", ["armchair", "bench", "office_chair", "parcel", "scissors"])
+def test_all_of_a_thing_hangs_together(family):
+    """From any of its solids a path of solids that touch leads to any other: nothing is held by nothing."""
+    for seed in (1, 2):
+        solids = [s for group in solids_of(family, seed).values() for s in group]
+        step = 0.008 * float(np.ptp(np.concatenate([s.vertices for s in solids]), axis=0).max())
+        clouds = [points_on(s, step) for s in solids]
+        lows, highs = (np.array([fn(s.vertices, axis=0) for s in solids]) for fn in (np.min, np.max))
+        reached, waiting = {0}, [0]
+        while waiting:
+            one = waiting.pop()
+            tree = cKDTree(clouds[one])
+            for other in set(range(len(solids))) - reached:
+                low, high = (
+                    np.maximum(lows[one], lows[other]) - step,
+                    np.minimum(highs[one], highs[other]) + step,
+                )
+                near = clouds[other][((clouds[other] > low) & (clouds[other] < high)).all(1)]
+                if len(near) and tree.query(near, distance_upper_bound=step)[0].min() < step:
+                    reached.add(other)
+                    waiting.append(other)
+        assert len(reached) == len(solids), (family, seed)
+
+
+def extent(solid: Solid) -> np.ndarray:
+    return np.ptp(solid.vertices, axis=0)
+
+
+@pytest.mark.parametrize("family", ["couch", "armchair"])
+def test_a_back_cushion_is_as_square_as_a_seat(family):
+    """Seen from the front it fills the corners of its box: an ellipse would fill 79 % of it."""
+    for seed in range(4):
+        for cushion in solids_of(family, seed)["cloth_cushions"]:
+            flat = (
+                cushion.vertices[:, :2]
+                if extent(cushion)[1] > extent(cushion)[2]
+                else cushion.vertices[:, ::2]
+            )
+            assert ConvexHull(flat).volume > 0.83 * np.prod(np.ptp(flat, axis=0))
+
+
+def test_rings_hold_their_curtain():
+    """They reach below its upper edge, at places where it passes below the rod."""
+    for seed in range(6):
+        parts = solids_of("curtain", seed)
+        (cloth,), (rings,) = parts["cloth"], parts["metal_rings"]
+        top = float(cloth.vertices[:, 2].max())
+        assert rings.vertices[:, 2].min() < top - 0.001
+        low = rings.vertices[rings.vertices[:, 2] < top + 0.002]
+        edge = cloth.vertices[cloth.vertices[:, 2] > top - 0.002]
+        corners = np.concatenate([edge[:-1] + s * (edge[1:] - edge[:-1]) for s in np.linspace(0, 1, 9)])
+        assert cKDTree(corners[:, :2]).query(low[:, :2])[0].max() < 0.02
+
+
+def test_books_stand_within_their_shelf():
+    for seed in range(30):
+        parts = solids_of("bookshelf", seed)
+        frame = np.concatenate([s.vertices for s in parts.pop("frame")])
+        books = np.concatenate([s.vertices for group in parts.values() for s in group])
+        assert (books.min(0) > frame.min(0)).all()
+        assert (books.max(0) < frame.max(0)).all()
+
+
+def test_a_keyboard_and_its_cable_lie_on_the_desk():
+    """Front and back edge of the case, and the free end of the cable."""
+    for seed in range(4):
+        parts = solids_of("keyboard", seed)
+        case, cable = (np.concatenate([s.vertices for s in parts[name]]) for name in ("case", "rubber_cable"))
+        floor = min(case[:, 2].min(), cable[:, 2].min())
+        for edge in (
+            case[case[:, 1] < 0],
+            case[case[:, 1] > 0],
+            cable[cable[:, 1] > cable[:, 1].max() - 0.01],
+        ):
+            assert edge[:, 2].min() - floor < 5e-4
+
+
+def test_a_cushion_has_no_wrinkles_where_its_piping_is(rng):
+    plain, wrinkled = pillow(0.4, 0.5, 0.15, 3.0, level=4), pillow(0.4, 0.5, 0.15, 3.0, rng, 4)
+    seam = np.abs(plain.vertices[:, 2]) < 1e-9
+    assert seam.sum() > 16
+    np.testing.assert_allclose(wrinkled.vertices[seam], plain.vertices[seam], atol=1e-9)
+
+
+def test_a_brush_has_a_handle_as_wide_as_its_ferrule():
+    for seed in range(6):
+        parts = solids_of("brush", seed)
+        handle, ferrule = extent(parts["wood_handle"][0]), extent(parts["metal_ferrule"][0])
+        assert handle[0] > 0.75 * ferrule[0]
+
+
+def test_the_claw_of_a_hammer_bends_towards_its_handle():
+    """And a hammer lies on its head and the end of its handle, whatever its head."""
+    claws = 0
+    for seed in range(12):
+        parts = solids_of("hammer", seed)
+        head, handle = parts["metal_head"], parts["wood_handle"][0].vertices
+        for prong in head[2:] if len(head) == 4 else []:
+            tip = prong.vertices[prong.vertices[:, 1] > prong.vertices[:, 1].max() - 1e-3]
+            root = prong.vertices[prong.vertices[:, 1] < prong.vertices[:, 1].min() + 1e-3]
+            assert tip[:, 0].mean() < root[:, 0].mean() - 0.008
+            claws += 1
+        low = min(float(s.vertices[:, 2].min()) for s in head)
+        assert abs(low - handle[:, 2].min()) < 0.006
+    assert claws
+
+
+def test_teeth_of_gears_meet_gaps():
+    """No point of a rim lies deeper in the next wheel than a tenth of a tooth is high."""
+    for seed in range(6):
+        rims = []
+        for solid in solids_of("gears", seed)["metal_gears"]:
+            middle = (solid.vertices[:, :2].min(0) + solid.vertices[:, :2].max(0)) / 2
+            rims.append((middle, solid.vertices[:, :2]))
+        axles = [s.vertices[:, :2].mean(0) for s in solids_of("gears", seed)["axles"]]
+        wheels = []
+        for axle in axles:
+            near = [p for m, p in rims if np.hypot(*(m - axle)) < np.hypot(*np.ptp(p, axis=0)) / 3]
+            wheels.append(np.concatenate(near) - axle)
+        for k in range(len(axles) - 1):
+            one, other = wheels[k], wheels[k + 1] + axles[k + 1] - axles[k]
+            reach = np.hypot(*one.T)
+            rim = one[reach > 0.8 * reach.max()]
+            angle = np.arctan2(rim[:, 1], rim[:, 0])
+            bins = np.round(angle / (2 * np.pi) * 720).astype(int) % 720
+            outline = np.zeros(720)
+            np.maximum.at(outline, bins, np.hypot(*rim.T))
+            known = np.flatnonzero(outline)
+            at = np.arctan2(other[:, 1], other[:, 0]) / (2 * np.pi) * 720 % 720
+            inside = np.interp(at, known, outline[known], period=720) - np.hypot(*other.T)
+            tooth = reach.max() - outline[known].min()
+            assert inside.max() < 0.25 * tooth, (seed, k)
+
+
+def test_the_tip_of_a_banana_can_be_seen():
+    for seed in range(4):
+        parts = solids_of("bananas", seed)
+        for fruit, tip in zip(parts["peel"], parts["tips"], strict=True):
+            planes = ConvexHull(fruit.vertices).equations
+            assert (tip.vertices @ planes[:, :3].T + planes[:, 3]).max(1).max() > 0.001
+
+
+def test_loaf_and_slices_lie_on_one_board():
+    for seed in range(6):
+        lows = [float(s.vertices[:, 2].min()) for group in solids_of("bread", seed).values() for s in group]
+        assert np.ptp(lows) < 1e-6
+
+
+def test_folded_paper_lies_level():
+    """The plane through its points is tilted by less than what crumpling does."""
+    for seed in range(8):
+        points = build_mesh("paper_folds", seed).vertices.astype(float)
+        slope = np.linalg.lstsq(np.c_[points[:, :2], np.ones(len(points))], points[:, 2], rcond=None)[0][:2]
+        assert np.degrees(np.arctan(np.hypot(*slope))) < 5
 
 
 def test_a_scene_of_forty_objects_is_light_and_quick():

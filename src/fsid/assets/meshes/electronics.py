@@ -113,12 +113,18 @@ def keyboard(rng: np.random.Generator) -> Parts:
     left = _keys(x * split - 0.008, y * 0.9, rows, tall).at(-x / 2 * (1 - split) + 0.002, 0, top)
     right = _keys(x * (1 - split) - 0.012, y * 0.9, rows, tall).at(x / 2 * split - 0.002, 0, top)
     s = np.linspace(0, 1, 26)
-    cord = np.c_[0.08 * np.sin(rng.uniform(3, 7) * s) * s, y / 2 + 0.22 * s, 0.01 - 0.006 * s]
-    placed = [p.turned(x_deg=tilt) for p in (board, left, right)]
+    cord = np.c_[
+        0.08 * np.sin(rng.uniform(3, 7) * s) * s, y / 2 - 0.004 + 0.224 * s, 0.0022 + 0.006 * (1 - s) ** 4
+    ]
+
+    def wedge(p: np.ndarray) -> np.ndarray:
+        rise = np.tan(np.radians(tilt)) * (p[:, 1] + y / 2)
+        return np.c_[p[:, :2], p[:, 2] + rise * np.minimum(p[:, 2] / top, 1)]
+
     return {
-        "case": placed[:1],
-        "plastic_keys": placed[1:2],
-        "plastic_block": placed[2:],
+        "case": [board.warped(wedge)],
+        "plastic_keys": [left.warped(wedge)],
+        "plastic_block": [right.warped(wedge)],
         "rubber_cable": [sweep(cord, 0.0022, 7)],
     }
 

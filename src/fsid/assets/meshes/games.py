@@ -66,13 +66,13 @@ def dice(rng: np.random.Generator) -> Parts:
             places.append(spin @ np.array((0.26 * size * u, 0.26 * size * v, 0.5 * size)))
     cube = box(size, size, size, size * rng.uniform(0.08, 0.3), 4).at(z=-size / 2)
     pips = copies(pip, np.array(turns), np.array(places))
-    spots = scatter_rand(rng, int(rng.integers(1, 6)), 1.9 * size)
+    lying = scatter_rand(rng, int(rng.integers(1, 6)), 1.9 * size)
     rolled = []
-    for _ in spots:
+    for _ in lying:
         a_deg, b_deg, c_deg = 90.0 * rng.integers(0, 4, 3)
         c_deg += rng.uniform(0, 360)
         rolled.append([part.turned(a_deg, b_deg, c_deg).at(z=size / 2) for part in (cube, pips)])
-    bodies, dots = zip(*spread(rolled, spots), strict=True)
+    bodies, dots = zip(*spread(rolled, lying), strict=True)
     return {"plastic_dice": bodies, "pips": dots}
 
 

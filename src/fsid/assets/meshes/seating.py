@@ -7,7 +7,7 @@ import numpy as np
 from fsid.assets.meshes.soft import pillow
 from fsid.assets.meshes.tables import turned_post
 from fsid.assets.registry import Parts, mesh_family
-from fsid.assets.solids import box, cone, cylinder, sheet, sweep
+from fsid.assets.solids import box, cone, cylinder, rotation_matrix, sheet, sweep
 
 
 @mesh_family("dining_chair")
@@ -76,17 +76,24 @@ def office_chair(rng: np.random.Generator) -> Parts:
     narrow = 1 - rng.uniform(0, 0.35) * v**3
     bow = hollow * (1 - u**2) - 0.03 * np.sin(np.pi * v) - 0.02
     points = np.stack([u * narrow * x / 2, bow, 0.12 + v * tall], axis=-1)
-    back = sheet(points, rng.uniform(0.02, 0.05)).turned(x_deg=-lean).at(0, x * 0.46, z)
-    stem = np.c_[0 * s, 0.1 + x * 0.42 * s**0.5, z - 0.05 + 0.32 * s**2]
+    pad = rng.uniform(0.02, 0.05)
+    back = sheet(points, pad).turned(x_deg=-lean).at(0, x * 0.46, z)
+    behind = points[3, 7:9].mean(0) + np.array((0, pad / 2 + 0.01, 0))
+    held = rotation_matrix(x_deg=-lean) @ behind + np.array((0, x * 0.46, z))
+    stem = np.c_[0 * s, 0.1 + (held[1] - 0.1) * s**0.35, z - 0.05 + (held[2] - z + 0.05) * s**2]
     metal.append(sweep(stem, 0.016, 10))
     parts = {"metal_base": metal, "rubber_castors": castors, "cloth_seat": [seat], "cloth_back": [back]}
     if rng.random() < 0.7:
         t = np.linspace(0, np.pi / 2, 8)
         bend = np.c_[0 * t, -0.04 - 0.05 * np.sin(t), 0.16 + 0.06 * np.cos(t)]
-        path = np.vstack([(0, 0.16, 0.22), bend, (0, -0.06, 0.0)])
+        path = np.vstack(
+            [(0, 0.16, 0.22), bend, (0, -0.06, 0.015), (-0.02, -0.06, -0.01), (-0.12, -0.06, -0.01)]
+        )
         rest = box(0.06, rng.uniform(0.2, 0.28), 0.03, 0.012, 3).at(0, 0.05, 0.205)
         sides = [
-            p.at(side * (x / 2 + 0.035), 0, z) for side in (-1, 1) for p in (sweep(path, 0.013, 10), rest)
+            p.at(side * (x / 2 + 0.035), 0, z)
+            for side in (-1, 1)
+            for p in (sweep(path * (side, 1, 1), 0.013, 10), rest)
         ]
         parts["plastic_arms"] = sides
     return parts
@@ -111,7 +118,8 @@ def armchair(rng: np.random.Generator) -> Parts:
         frame.append(rail.at(side * (x / 2 + bar), 0, z - 0.06))
     frame += [box(x, 0.03, 0.045, 0.006).at(0, k * 0.42 * y, z - 0.07 - 0.02 * k) for k in (-1, 1)]
     slats = [
-        box(0.035, 0.014, tall, 0.004).at(h * x, 0.02) for h in np.linspace(-0.42, 0.42, rng.integers(4, 9))
+        box(0.035, 0.014, tall + 0.05, 0.004).at(h * x, 0.02, -0.05)
+        for h in np.linspace(-0.42, 0.42, rng.integers(4, 9))
     ]
     slats += [box(x, 0.022, 0.05, 0.006).at(0, 0.022, tall - 0.03)]
     back = [p.turned(x_deg=-lean).at(0, 0.4 * y, z - 0.02) for p in slats]
@@ -121,6 +129,6 @@ def armchair(rng: np.random.Generator) -> Parts:
         .turned(x_deg=4)
         .at(0, -0.02, z + 0.35 * thick)
     ]
-    rest = pillow(x - 0.02, thick, tall * 0.92, rng.uniform(2.8, 4), rng, 4).turned(x_deg=-lean)
+    rest = pillow(x - 0.02, tall * 0.92, thick, rng.uniform(2.8, 4), rng, 4).turned(x_deg=90 - lean)
     cushions.append(rest.at(0, 0.4 * y - 0.05 + 0.1 * tall, z + 0.55 * thick + 0.46 * tall))
     return {"wood_frame": frame, "wood_back": back, "cloth_cushions": cushions}

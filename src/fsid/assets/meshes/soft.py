@@ -27,7 +27,7 @@ def couch(rng: np.random.Generator) -> Parts:
     for k in range(seats):
         cx = (k - (seats - 1) / 2) * wide
         cushions.append(pillow(wide - 0.01, depth - 0.2, seat, 3.5).at(cx, -0.09, 0.1 + base + seat * 0.42))
-        lean = pillow(wide - 0.02, 0.18, back, 3.0).turned(x_deg=-rng.uniform(6, 16))
+        lean = pillow(wide - 0.02, back, 0.18, 3.0).turned(x_deg=90 - rng.uniform(6, 16))
         cushions.append(lean.at(cx, depth / 2 - 0.24, 0.1 + base + seat * 0.8 + back / 2))
     feet = [
         cone(0.018, 0.026, 0.11, 0.003, 16).at(sx * (x / 2 - 0.08), sy * (depth / 2 - 0.08))
@@ -68,7 +68,8 @@ def cushion(rng: np.random.Generator) -> Parts:
 def pillow(
     x: float, y: float, z: float, pinch: float, rng: np.random.Generator | None = None, level: int = 3
 ) -> Solid:
-    """Superellipse outline of exponent `pinch` with a puffed, round section; wrinkled when `rng` is given."""
+    """Superellipse outline of exponent `pinch` with a puffed, round section; wrinkled when `rng` is given,
+    but for its seam."""
     d = ball_directions(level)
     flat = np.hypot(d[:, 0], d[:, 1]) + 1e-9
     outline = flat / (np.abs(d[:, 0]) ** pinch + np.abs(d[:, 1]) ** pinch + 1e-12) ** (1 / pinch)
@@ -77,7 +78,7 @@ def pillow(
     if rng is not None:
         for _ in range(6):
             wave = rng.normal(0, 5, 3)
-            radii += 0.012 * np.sin(d @ wave + rng.uniform(0, 6.3))
+            radii += 0.012 * np.sin(d @ wave + rng.uniform(0, 6.3)) * (1 - flat**6)
     solid = ball(radii, level)
     shaped = Solid(solid.vertices * np.c_[stretch, stretch, np.ones(len(d))], solid.normals, solid.faces)
     return _renormalised(shaped.stretched(x / 2, y / 2, z / 2))

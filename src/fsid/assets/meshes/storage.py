@@ -53,13 +53,16 @@ def bookshelf(rng: np.random.Generator) -> Parts:
         while place < end and rng.random() > 0.03:
             thick = rng.uniform(0.012, 0.05)
             tall = min(rng.uniform(0.6, 0.95) * (step - board), 0.34)
-            deep = rng.uniform(0.6, 0.9) * y
-            book = box(thick, deep, tall, 0.003, 1).at(
-                thick / 2, -y / 2 + deep / 2 + rng.uniform(0.005, 0.03), 0
-            )
+            deep, front = rng.uniform(0.6, 0.9) * y, rng.uniform(0.005, 0.03)
+            deep = min(deep, y - 0.01 - front)
+            book = box(thick, deep, tall, 0.003, 1).at(thick / 2, -y / 2 + deep / 2 + front, 0)
             lean = rng.uniform(3, 12) if rng.random() < 0.08 else 0.0
-            books[rng.integers(3)].append(book.turned(y_deg=lean).at(place, 0, j * step + board + 0.001))
-            place += thick + 0.001 + tall * np.sin(np.radians(lean))
+            aside = tall * np.sin(np.radians(lean))
+            if place + thick + aside > end + 0.05:
+                lean = aside = 0.0
+            leant = book.turned(y_deg=lean).resting(j * step + board + 0.001)
+            books[rng.integers(3)].append(leant.at(place))
+            place += thick + 0.001 + aside
     parts = {"frame": frame, "books_a": books[0], "books_b": books[1], "books_c": books[2]}
     return {name: solids for name, solids in parts.items() if solids}
 
@@ -213,7 +216,7 @@ def _bent_flap(rng: np.random.Generator, length: float, reach: float, wall: floa
     t = np.linspace(0, 1, 8)
     angle = np.radians(90 - open_deg * np.minimum(1, 4 * t) + rng.normal(0, 8) * t)
     step = reach / 7
-    y, z = -np.cumsum(np.cos(angle)) * step, np.cumsum(np.sin(angle)) * step
+    y, z = -np.cumsum(np.r_[0, np.cos(angle[1:])]) * step, np.cumsum(np.r_[0, np.sin(angle[1:])]) * step
     along = np.linspace(-length / 2, length / 2, 6)
     grid = np.stack(np.broadcast_arrays(along[None], y[:, None], z[:, None]), axis=-1)
     return sheet(grid, wall * 0.7)

@@ -47,24 +47,30 @@ def bench(rng: np.random.Generator) -> Parts:
     count, slat, gap = int(rng.integers(3, 7)), rng.uniform(0.05, 0.09), rng.uniform(0.008, 0.02)
     depth = count * (slat + gap)
     thick = rng.uniform(0.018, 0.03)
-    rows = (np.arange(count) - (count - 1) / 2) * (slat + gap)
-    slats = [box(x, slat, thick, 0.005).at(0, y, seat_z - thick) for y in rows]
+    across = (np.arange(count) - (count - 1) / 2) * (slat + gap)
+    slats = [box(x, slat, thick, 0.005).at(0, y, seat_z - thick) for y in across]
     posts = [
         box(0.05, 0.05, seat_z - thick).at(sx * (x / 2 - 0.1), sy * (depth / 2 - 0.03))
         for sx in (-1, 1)
         for sy in (-1, 1)
     ]
+    reach = 0.01
     if rng.random() < 0.6:
         height, lean = rng.uniform(0.25, 0.45), rng.uniform(5, 18)
-        for k in range(int(rng.integers(2, 5))):
+        rows, reach = int(rng.integers(2, 5)), 0.06
+        height = max(height, 0.13 + (rows - 1) * (slat + gap) + 0.7 * slat)
+        for k in range(rows):
             back = box(x, thick, slat, 0.005).at(z=0.06 + k * (slat + gap) + 0.02)
             slats.append(back.turned(x_deg=-lean).at(0, depth / 2, seat_z))
         posts += [
             box(0.045, 0.035, height)
+            .at(0, thick / 2 + 0.0165, -0.05)
             .turned(x_deg=-lean)
-            .at(s * (x / 2 - 0.1), depth / 2 + 0.03, seat_z - 0.05)
+            .at(s * (x / 2 - 0.1), depth / 2, seat_z)
             for s in (-1, 1)
         ]
+    bearer = box(0.044, depth + reach - 0.02, 0.03).at(y=reach / 2, z=seat_z - thick - 0.029)
+    posts += [bearer.at(s * (x / 2 - 0.1)) for s in (-1, 1)]
     return {"slats": slats, "frame": posts}
 
 

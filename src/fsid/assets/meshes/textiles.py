@@ -49,16 +49,15 @@ def curtain(rng: np.random.Generator) -> Parts:
     gather = 1 - rng.uniform(0.3, 0.7) * (rng.random() < 0.5) * np.exp(-(((t - 0.6) / 0.16) ** 2))
     y = deep * gather * (0.45 + 0.55 * t**0.5) * np.cos(np.pi * pleats * u + jitter)
     points = np.stack(np.broadcast_arrays(x / 2 * u * gather, y, z * (1 - t) + 0 * u), axis=-1)
-    rod_z = z + 0.035
+    rod_z = z + 0.022
     rod = [cylinder(0.011, x + 0.16, 0.002, 16).at(z=-x / 2 - 0.08).turned(y_deg=90).at(z=rod_z)]
     rod += [ball(0.022, 2).at(s * (x / 2 + 0.09), 0, rod_z) for s in (-1, 1)]
+    before, after = points[0, :-1], points[0, 1:]
+    crossing = np.flatnonzero(before[:, 1] * after[:, 1] < 0)[::2]  # where the top edge passes below the rod
+    share = (before[:, 1] / (before[:, 1] - after[:, 1]))[crossing]
+    held = before[crossing, 0] + share * (after - before)[crossing, 0]
     a = np.linspace(0, 2 * np.pi, 18, endpoint=False)
-    rings = np.array(
-        [
-            np.c_[0 * a + px, 0.02 * np.cos(a), 0.02 * np.sin(a) + rod_z - 0.006]
-            for px in np.linspace(-0.48, 0.48, pleats) * x
-        ]
-    )
+    rings = np.array([np.c_[0 * a + px, 0.02 * np.cos(a), 0.02 * np.sin(a) + rod_z - 0.006] for px in held])
     return {
         "cloth": [sheet(points[:, ::-1], 0.0025)],
         "metal_rod": rod,
