@@ -16,7 +16,7 @@ from fsid.assets import (
 )
 from fsid.assets.material_registry import draw_material
 from fsid.assets.materials import images, sheets
-from fsid.assets.patterns import cells, level, noise, shade, stack, warp
+from fsid.assets.patterns import cells, joint, level, noise, shade, stack, warp
 from fsid.errors import FsidError
 
 REPOSITORY = Path(__file__).resolve().parents[1]
@@ -145,6 +145,24 @@ def test_nothing_drawn_is_cut_by_the_border(family, size, limit, monkeypatch):
     for variant in range(MATERIAL_VARIANTS):
         draw_material(family, variant, size)
     assert max(shares) <= limit
+
+
+@pytest.mark.parametrize("cells_per_tile", [3, 8, 16, 24, 28, 32])
+def test_a_joint_takes_the_same_share_at_every_size(cells_per_tile):
+    def share(size: int) -> float:
+        x = (np.arange(size) + 0.5) / size * cells_per_tile
+        return float(joint(np.abs(x % 1 - 0.5), 0.485, 0.03, cells_per_tile / size).mean())
+
+    for size in (128, 256, 512, 1024):
+        assert share(size) == pytest.approx(share(8192), rel=0.4)
+
+
+@pytest.mark.parametrize("family", ["wood_planks", "parquet", "end_grain"])
+def test_joints_of_boards_and_blocks_are_there_at_every_size(family):
+    """They lie between the centres of two texels, where nothing is drawn that is finer than a texel."""
+    for variant in range(MATERIAL_VARIANTS):
+        coarse, fine = (draw_material(family, variant, size).pattern.mean() for size in (128, 512))
+        assert coarse == pytest.approx(fine, rel=0.35), variant
 
 
 @pytest.mark.parametrize("layer", material_layers())

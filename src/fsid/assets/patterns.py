@@ -70,6 +70,22 @@ def edge(field: np.ndarray, at: float | np.ndarray, width: float) -> np.ndarray:
     return t * t * (3 - 2 * t)
 
 
+def joint(field: np.ndarray, at: float, width: float, texel: float, border: float = 0.5) -> np.ndarray:
+    """`edge` of a joint between `at` and the `border` of a cell, the highest value of `field`.
+
+    texel: step of `field` from texel to texel. A joint finer than that lies between their centres: it is
+    drawn wider, and as much fainter, so that it is there at every size and takes the same share of the area.
+    """
+    soft = max(width, 1.5 * texel)
+    return edge(field, at, soft) * np.float32(_area(border - at, width) / _area(border - at, soft))
+
+
+def _area(half: float, width: float) -> float:
+    """Below a smooth step over `width`, up to `half` behind its centre."""
+    t = min(0.5 + half / width, 1.0)
+    return width * (t**3 - t**4 / 2) + max(half - width / 2, 0.0)
+
+
 def warp(field: np.ndarray, du: np.ndarray | float, dv: np.ndarray | float) -> np.ndarray:
     """`field` looked up at (u + du, v + dv), displacements in fractions of a tile, bilinear, periodic."""
     size = len(field)

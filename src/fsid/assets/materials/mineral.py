@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fsid.assets.material_registry import Layers, material_family
-from fsid.assets.patterns import axes, cells, edge, level, noise, scratches
+from fsid.assets.patterns import axes, cells, edge, joint, level, noise, scratches
 
 
 @material_family(
@@ -155,7 +155,7 @@ def tiles(rng: np.random.Generator, variant: int, size: int) -> Layers:
     i, j = np.floor(x).astype(int), np.floor(y).astype(int)
     x, y = x % 1 - 0.5, y % 1 - 0.5
     shade = rng.random((count, count))[j, i]
-    grout = edge(np.maximum(np.abs(x), np.abs(y)), 0.478, 0.02)
+    grout = joint(np.maximum(np.abs(x), np.abs(y)), 0.478, 0.02, count / size)
     flip = rng.random((count, count))[j, i] < 0.5
     a = np.where(flip, x, -x)
     ring = np.minimum(np.hypot(a - 0.5, y - 0.5), np.hypot(a + 0.5, y + 0.5))

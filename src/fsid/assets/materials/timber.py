@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fsid.assets.material_registry import Layers, material_family
-from fsid.assets.patterns import axes, cells, edge, level, noise, shade, stack, warp
+from fsid.assets.patterns import axes, cells, edge, joint, level, noise, shade, stack, warp
 
 
 @material_family("plywood", tile_m=0.8, relief_m=0.0006, colours="d9b98a c79c63 8a6238")
@@ -138,7 +138,8 @@ def end_grain(rng: np.random.Generator, variant: int, size: int) -> Layers:
     angle = np.arctan2(dy, dx)
     rays = level(noise(rng, size, 0.8, low=size / 20) - 1, 0.5) * (0.5 + 0.5 * np.cos(160 * angle))
     check = edge(np.cos(angle * 3 + 6 * tone), 0.9985, 0.002) * edge(noise(rng, size, 1.6), 0.6, 0.3)
-    gap = edge(np.maximum(np.abs(x % 1 - 0.5), np.abs(y % 1 - 0.5)), 0.488, 0.012)
+    to_side = np.maximum(np.abs(x % 1 - 0.5), np.abs(y % 1 - 0.5))
+    gap = joint(to_side, 0.488, 0.012, count / size)
     return Layers(
         mix=np.clip(0.6 * late + 0.5 * tone, 0, 1),
         pattern=np.clip(0.8 * gap + 0.7 * check + 0.2 * rays, 0, 1),

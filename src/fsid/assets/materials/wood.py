@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fsid.assets.material_registry import Layers, material_family
-from fsid.assets.patterns import axes, edge, level, noise, warp
+from fsid.assets.patterns import axes, edge, joint, level, noise, warp
 
 
 def _fibres(rng: np.random.Generator, size: int) -> tuple[np.ndarray, np.ndarray]:
@@ -39,7 +39,8 @@ def wood_planks(rng: np.random.Generator, variant: int, size: int) -> Layers:
     bands = warp(bands, shift[board, 0], shift[board, 1])
     to_side = np.abs((v * rows) % 1 - 0.5)
     to_end = np.abs(along % 1 - 0.5) * rows / 2
-    gap = np.maximum(edge(to_side, 0.485, 0.03), edge(to_end, rows / 4 - 0.015, 0.03))
+    sides = joint(to_side, 0.485, 0.03, rows / size)
+    gap = np.maximum(sides, joint(to_end, rows / 4 - 0.015, 0.03, rows / size, rows / 4))
     return Layers(
         mix=level(bands + 1.6 * (shade[board] - 0.5)),
         pattern=0.85 * gap + 0.15 * (1 - gap) * level(pores - 1.2, 0.4),
@@ -102,7 +103,8 @@ def parquet(rng: np.random.Generator, variant: int, size: int) -> Layers:
     bands, pores = _fibres(rng, size)
     bands, pores = np.where(flip, bands.T, bands), np.where(flip, pores.T, pores)
     to_end = np.maximum(np.abs(x % 1 - 0.5), np.abs(y % 1 - 0.5))
-    gap = np.maximum(edge(np.abs(across % 1 - 0.5), 0.48, 0.05), edge(to_end, 0.495, 0.012))
+    sides = joint(np.abs(across % 1 - 0.5), 0.48, 0.05, squares * strips / size)
+    gap = np.maximum(sides, joint(to_end, 0.495, 0.012, squares / size))
     return Layers(
         mix=level(0.7 * bands + 2.4 * (shade - 0.5)),
         pattern=0.8 * gap,
