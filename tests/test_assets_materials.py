@@ -165,6 +165,14 @@ def test_joints_of_boards_and_blocks_are_there_at_every_size(family):
         assert coarse == pytest.approx(fine, rel=0.35), variant
 
 
+@pytest.mark.parametrize("family", ["weave", "tartan"])
+def test_cloth_is_as_bright_where_threads_are_finer_than_texels(family):
+    for variant in range(MATERIAL_VARIANTS):
+        coarse, middle, fine = (draw_material(family, variant, s).detail.mean() for s in (128, 256, 512))
+        assert coarse == pytest.approx(fine, abs=0.02)
+        assert middle == pytest.approx(fine, abs=0.02)
+
+
 @pytest.mark.parametrize("layer", material_layers())
 def test_a_layer_changes_a_material_and_stays_tileable(layer):
     for variant in range(MATERIAL_VARIANTS):

@@ -9,24 +9,35 @@ from fsid.assets.patterns import axes, cells, edge, level, noise
 
 
 def _woven(rng: np.random.Generator, size: int, threads: int, kind: str) -> tuple[np.ndarray, ...]:
-    """(over, bump, fibres): 1 where the warp thread lies on top; thread height 0..1; fibre noise."""
+    """(over, bump, fibres): 1 where the warp thread lies on top; thread height 0..1, the mean of a texel
+    where threads are finer; fibre noise."""
     u, v = axes(size)
     wobble = noise(rng, size, 1.5, low=2, high=threads / 2) * np.float32(0.12)
     x, y = u * threads + wobble, v * threads + wobble.T
+    count = -(-2 * threads // size)
+    within = [((k + 0.5) / count - 0.5) * threads / size for k in range(count)]
+    bump = np.mean([_bump(x + dx, y + dy, kind) for dx in within for dy in within], axis=0)
+    fibre = noise(rng, size, 0.2, low=size / 12, stretch=(6, 1))
+    over = _over(x, y, kind)
+    return over, bump.astype(np.float32), np.where(over, fibre.T, fibre)
+
+
+def _over(x: np.ndarray, y: np.ndarray, kind: str) -> np.ndarray:
     i, j = np.floor(x).astype(np.int32), np.floor(y).astype(np.int32)
     if kind == "plain":
-        over = (i + j) % 2 == 0
-    elif kind == "twill":
-        over = (i + j) % 4 < 2
-    elif kind == "denim":
-        over = (i - j) % 3 != 0
-    else:
-        over = (i // 2 + j // 2) % 2 == 0
+        return (i + j) % 2 == 0
+    if kind == "twill":
+        return (i + j) % 4 < 2
+    if kind == "denim":
+        return (i - j) % 3 != 0
+    return (i // 2 + j // 2) % 2 == 0
+
+
+def _bump(x: np.ndarray, y: np.ndarray, kind: str) -> np.ndarray:
+    over = _over(x, y, kind)
     across = np.where(over, x, y) % 1 - 0.5
     along = np.where(over, y, x) % 1 - 0.5
-    bump = np.sqrt(np.clip(1 - (2 * across) ** 2, 0.03, 1)) * (0.65 + 0.35 * np.cos(np.pi * along))
-    fibre = noise(rng, size, 0.2, low=size / 12, stretch=(6, 1))
-    return over, bump.astype(np.float32), np.where(over, fibre.T, fibre)
+    return np.sqrt(np.clip(1 - (2 * across) ** 2, 0.03, 1)) * (0.65 + 0.35 * np.cos(np.pi * along))
 
 
 @material_family("weave", tile_m=0.15, relief_m=0.0008)
