@@ -173,6 +173,15 @@ def test_cloth_is_as_bright_where_threads_are_finer_than_texels(family):
         assert middle == pytest.approx(fine, abs=0.02)
 
 
+def test_rings_of_a_zone_plate_that_are_finer_than_texels_are_grey():
+    """Sampled at texels they would be other, wider rings around other centres."""
+    pattern = draw_material("test_chart", 3, 128).pattern
+    at = np.abs((np.arange(128) + 0.5) / 64 % 1 - 0.5)
+    far = np.hypot(*np.meshgrid(at, at)) > 0.29  # the widest of the four has a ring per two texels here
+    assert pattern[far].std() < 0.01
+    assert pattern[~far].std() > 0.05
+
+
 @pytest.mark.parametrize("layer", material_layers())
 def test_a_layer_changes_a_material_and_stays_tileable(layer):
     for variant in range(MATERIAL_VARIANTS):

@@ -75,7 +75,8 @@ def test_chart(rng: np.random.Generator, variant: int, size: int) -> Layers:
     else:
         x, y = u * 2 % 1 - 0.5, v * 2 % 1 - 0.5
         reach = np.array((60.0, 110.0, 180.0, 260.0))[(np.floor(u * 2) + 2 * np.floor(v * 2)).astype(int)]
-        printed = 0.5 + 0.5 * np.cos(np.pi * reach * (x * x + y * y) * 2)
+        shown = 1 - edge(reach * np.hypot(x, y) * 4 / size, 0.42, 0.16)  # of cycles per texel, up to a half
+        printed = 0.5 + 0.5 * shown * np.cos(np.pi * reach * (x * x + y * y) * 2)
     return _on_paper(rng, size, printed, 0.5)
 
 
