@@ -182,6 +182,12 @@ def test_rings_of_a_zone_plate_that_are_finer_than_texels_are_grey():
     assert pattern[~far].std() > 0.05
 
 
+def test_rows_of_a_table_are_as_high_as_their_letters():
+    """Nothing is set in less than six pixels: lower rows were written over each other."""
+    for variant in range(MATERIAL_VARIANTS):
+        assert draw_material("tables", variant, 128).pattern.mean() < 0.45
+
+
 @pytest.mark.parametrize("layer", material_layers())
 def test_a_layer_changes_a_material_and_stays_tileable(layer):
     for variant in range(MATERIAL_VARIANTS):

@@ -37,7 +37,7 @@ def tables(rng: np.random.Generator, variant: int, size: int) -> Layers:
     for i in range(blocks):
         for j in range(blocks):
             box = (i * step + 0.03 * step, j * step + 0.04 * step, (i + 0.97) * step, (j + 0.96) * step)
-            _table(rng, draw, tint_draw, box, int(wide * rng.uniform(0.009, 0.022)))
+            _table(rng, draw, tint_draw, box, max(int(wide * rng.uniform(0.009, 0.022)), 6))
     return _sheet(rng, size, averaged(image), 0.9 * averaged(tint))
 
 
