@@ -334,3 +334,20 @@ def test_the_papers_configuration_is_found_by_name_and_by_path() -> None:
     config = generate_config("fsid-175k")
     assert (config.width, config.height, config.variant) == (1920, 1080, "full")
     assert generate_config(REPOSITORY / "configs" / "fsid-175k.yaml") == config
+
+
+def test_a_place_that_takes_no_picture_is_said_before_scenes_are_rendered(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def never(*_: object, **__: object) -> None:
+        raise AssertionError("rendered what cannot be written")
+
+    monkeypatch.setattr("fsid.dataset.contact_sheet", never)
+    (tmp_path / "folder.png").mkdir()
+    with pytest.raises(SystemExit):
+        main(["preview", str(tmp_path / "folder.png"), "--quiet"])
+    assert "it is no file" in capsys.readouterr().err
+    monkeypatch.setattr("fsid.files.os.access", lambda *_: False)
+    with pytest.raises(SystemExit):
+        main(["preview", str(tmp_path / "new.png"), "--quiet"])
+    assert "no folder that you may write to" in " ".join(capsys.readouterr().err.split())

@@ -6,6 +6,7 @@ import inspect
 import subprocess
 import sys
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import BinaryIO
 
@@ -326,6 +327,25 @@ def test_a_folder_that_is_not_there_is_said_before_the_work(noisy_file: Path, ne
 
     with pytest.raises(FsidError, match="no such folder"):
         denoise_file(noisy_file, noisy_file.parent / "none" / "out.dng", load_model(network), progress=never)
+
+
+@pytest.mark.parametrize("suffix", [".dng", ".onnx", ".safetensors"])
+def test_a_place_that_takes_no_file_is_said_before_the_work(
+    noisy_file: Path, network: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str
+) -> None:
+    def never(*_: object, **__: object) -> None:
+        raise AssertionError("worked for what cannot be written")
+
+    for name in ("fsid.denoise.export.probes", "fsid.denoise.files.read_input"):
+        monkeypatch.setattr(name, never)
+    source = noisy_file if suffix == ".dng" else network
+    write = partial(denoise_file, model=load_model(network)) if suffix == ".dng" else export
+    (tmp_path / f"folder{suffix}").mkdir()
+    with pytest.raises(FsidError, match="it is no file"):
+        write(source, tmp_path / f"folder{suffix}")
+    monkeypatch.setattr("fsid.files.os.access", lambda *_: False)
+    with pytest.raises(FsidError, match="no folder that you may write to"):
+        write(source, tmp_path / f"new{suffix}")
 
 
 def test_a_folder_of_bare_mosaics(

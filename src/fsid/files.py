@@ -85,6 +85,15 @@ def check_folder(folder: Path) -> None:
         raise FsidError(f"{folder}: cannot be written; {there} is no folder that you may write to")
 
 
+def check_output(path: Path) -> None:
+    """FsidError unless a file can be written to `path`: before the work of which it is made."""
+    if not path.parent.is_dir():
+        raise FsidError(f"{path}: cannot be written (no such folder); make it first")
+    if path.exists() and not path.is_file():
+        raise FsidError(f"{path}: cannot be written (it is no file); give another name")
+    check_folder(path.parent)
+
+
 @contextlib.contextmanager
 def held(folder: Path, taken: str) -> Iterator[bool]:
     """`folder` exists and is this process's until the end of the block, or until it dies.

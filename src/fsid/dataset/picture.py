@@ -14,7 +14,7 @@ from fsid.dataset.config import GenerateConfig
 from fsid.dataset.sample import make_sample, to_uint8
 from fsid.dataset.worker import rendering
 from fsid.errors import FsidError
-from fsid.files import write_atomically
+from fsid.files import check_output, write_atomically
 from fsid.sensor import develop
 
 GAP_PX = 4
@@ -35,11 +35,10 @@ def save_png(path: str | Path, srgb: np.ndarray) -> None:
 
 
 def check_png(path: Path) -> None:
-    """FsidError unless `path` names a PNG file in a folder that exists."""
+    """FsidError unless `path` names a PNG file that can be written."""
     if path.suffix.lower() != ".png":
         raise FsidError(f"{path}: pictures are written as .png")
-    if not path.parent.is_dir():
-        raise FsidError(f"{path}: its folder does not exist")
+    check_output(path)
 
 
 def contact_sheet(

@@ -21,7 +21,7 @@ from fsid.denoise.onnx_int8 import eight_bit
 from fsid.denoise.quality import Probe, mean_psnr, probes
 from fsid.denoise.sessions import read_sessions
 from fsid.errors import FsidError
-from fsid.files import write_atomically
+from fsid.files import check_output, write_atomically
 from fsid.sensor import NoiseLevel
 
 Precision = Literal["float32", "float16", "int8"]
@@ -59,8 +59,7 @@ def export(run: str | Path | None, file: str | Path, precision: Precision | None
         raise FsidError("int8: is for .onnx; .safetensors holds float32 or float16")
     if file.resolve() == path.resolve():
         raise FsidError(f"{file}: is the network itself, which would be overwritten; give another name")
-    if not file.parent.is_dir():
-        raise FsidError(f"{file.parent}: no such folder")
+    check_output(file)
     denoiser = load_denoiser(path)
     measured = probes()
     if suffix == ".onnx":

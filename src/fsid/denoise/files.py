@@ -14,7 +14,7 @@ from pathlib import Path
 from fsid.denoise.denoise import Network, check_strength, denoise_raw
 from fsid.denoise.preview import preview_of
 from fsid.errors import FsidError
-from fsid.files import paths_of
+from fsid.files import check_output, paths_of
 from fsid.sensor import (
     Layout,
     NoiseLevel,
@@ -154,10 +154,9 @@ def denoise_file(
     source, target = Path(source), Path(target)
     if target.suffix.lower() != ".dng":
         raise FsidError(f"{target}: a denoised RAW is written as .dng")
-    if not target.parent.is_dir():
-        raise FsidError(f"{target.parent}: no such folder; make it first")
     if target.resolve() == source.resolve():
         raise FsidError(f"{target}: is the original, which would be overwritten; give another name")
+    check_output(target)
     raw = read_input(source, layout)
     if min(raw.mosaic.shape) < _SMALLEST_PX:
         height, width = raw.mosaic.shape

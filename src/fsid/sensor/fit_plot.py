@@ -16,7 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fsid.errors import FsidError
-from fsid.files import check_folder
+from fsid.files import check_output
 from fsid.sensor.calibrate import LINEAR_SHARE, NoiseFit
 from fsid.sensor.camera_fit import Calibration
 from fsid.sensor.camera_profile import MONO, CameraProfile
@@ -54,13 +54,6 @@ def check_profile(path: Path, frames: Collection[Path], plot: Path | None) -> No
     for written in (path, plot):
         if written is not None and written.resolve() in taken:
             raise FsidError(f"{written}: is one of the frames; write to another file")
-
-
-def check_output(path: Path) -> None:
-    """FsidError unless the folder of `path` is there and takes files, and `path` is no folder."""
-    if not path.parent.is_dir() or path.is_dir():
-        raise FsidError(f"{path}: cannot be written; its folder must be there, and it must be no folder")
-    check_folder(path.parent)
 
 
 def calibration_picture(calibration: Calibration, suffix: str) -> bytes:
