@@ -31,8 +31,9 @@ INTRODUCTION = """# Materials
 
 A surface is (family, variant, three colours): `fsid.assets.bake_material("brick", 2)` makes tileable maps at
 any power of two from 64 to 8192 texels, and every use recolours them. A family is one function in
-`src/fsid/assets/materials/`; adding one touches one file. This page is written by
-`python tools/materials.py` from the registry.
+`src/fsid/assets/materials/`; adding one touches one file. `src/fsid/scene/pools.py` names those that are
+common on floors, walls or grounds, and those without order. This page is written by
+`python tools/materials.py`.
 
 ![Every family on a cushion](images/materials.jpg)
 

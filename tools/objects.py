@@ -27,7 +27,8 @@ INTRODUCTION = """# Objects
 
 Every object is built from (family, seed) alone: `fsid.assets.build_mesh("vase", 7)`. A family is one function
 of a random generator in `src/fsid/assets/meshes/`, with continuous parameters and named material parts;
-adding one touches one file. This page is written by `python tools/objects.py` from the registry.
+adding one touches one file. `src/fsid/scene/pools.py` names those that are common out of doors. This page is
+written by `python tools/objects.py`.
 
 ![One object of each family](images/objects.jpg)
 
