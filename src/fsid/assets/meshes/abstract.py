@@ -211,8 +211,7 @@ def paper_folds(rng: np.random.Generator) -> Parts:
         deep, zig = rng.uniform(0.3, 0.9) / n, rng.uniform(0.15, 0.5) / n
         i, j = np.meshgrid(np.arange(n), np.arange(n))
         points = np.stack([u * 0.8 + 0 * v, v + zig * (-1.0) ** i, deep * (-1.0) ** j + 0 * u], axis=-1)
-    crumpled = _faceted(sheet(points * size, 0.0009))
-    return {"paper": [crumpled.turned(rng.normal(0, 8), rng.normal(0, 8))]}
+    return {"paper": [_faceted(sheet(points * size, 0.0009))]}
 
 
 @mesh_family("petal_burst")

@@ -42,7 +42,9 @@ def bananas(rng: np.random.Generator) -> Parts:
     for k in range(int(rng.integers(1, 7))):
         turn = (rng.normal(0, 4), rng.normal(0, 6) - 12, 13 * (k - 2) + rng.normal(0, 3))
         many.append(one.at(x=length * 0.34).turned(*turn).at(z=0.014 * (k % 2)))
-        tip = sweep(path[-3:], 0.27 * thick, 8).at(x=length * 0.34)
+        out = (path[-1] - path[-2]) / np.linalg.norm(path[-1] - path[-2])
+        tip = sweep(path[-1] + np.linspace(0, 0.45, 3)[:, None] * thick * out, 0.24 * thick, 8)
+        tip = tip.at(x=length * 0.34)
         tips.append(tip.turned(*turn).at(z=0.014 * (k % 2)))
     root = many[0].vertices[:10].mean(0)
     stalk = sweep(np.array([(-0.012, 0, 0.004), (0.0, 0, 0.0), (0.03, 0.0, -0.004)]) + root, thick * 0.7, 10)
@@ -88,7 +90,7 @@ def bread(rng: np.random.Generator) -> Parts:
         radii *= 1 + 0.015 * np.sin(d @ rng.normal(0, 5, 3) + rng.uniform(0, 6.3))
     points = ball(radii, 4).vertices * (x, y / 2, z / 2)
     points[:, 2] = np.maximum(points[:, 2], -0.36 * z) + 0.002 * d[:, 2]
-    faces = ball(1.0, 4).faces
+    low, faces = float(points[:, 2].min()), ball(1.0, 4).faces
     parts = {"crust": [Solid(points, smooth_normals(points, faces), faces)]}
     slices = []
     outline_angle = np.linspace(0, 2 * np.pi, 48, endpoint=False)
@@ -97,7 +99,7 @@ def bread(rng: np.random.Generator) -> Parts:
         c, s = np.cos(outline_angle), np.sin(outline_angle)
         reach = (np.abs(c) ** power + np.abs(s) ** power) ** (-1 / power)
         ring = np.c_[reach, reach] * np.c_[c * y, s * z] * 0.46
-        slice_ = plate(ring, thick, 0.0015).turned(y_deg=90 - rng.uniform(20, 50)).resting(-0.4 * z)
+        slice_ = plate(ring, thick, 0.0015).turned(y_deg=90 - rng.uniform(20, 50)).resting(low)
         slices.append(slice_.at(x=x * 1.12 + 0.035 * k, y=rng.normal(0, 0.006)))
     return parts | ({"slices": slices} if slices else {})
 

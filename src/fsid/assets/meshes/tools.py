@@ -41,10 +41,11 @@ def hammer(rng: np.random.Generator) -> Parts:
                     0.012 + s * 0.5 * wide,
                     -1.4 * size * s**2,
                 )
-                head.append(prong.at(x=float(fan.mean())))
+                head.append(prong.turned(y_deg=90).at(z=float(fan.mean())))
     parts = {"wood_handle": [grip], "metal_head": [h.at(x=length - 0.012) for h in head]}
-    lift = max(-float(join(head).vertices[:, 2].min()), thick)
-    return {name: [s.at(z=lift) for s in solids] for name, solids in parts.items()}
+    above = -float(join(head).vertices[:, 2].min()) - thick
+    lean = np.degrees(np.arcsin(max(above, 0.0) / length))
+    return {name: [s.turned(y_deg=-lean) for s in solids] for name, solids in parts.items()}
 
 
 @mesh_family("wrench")
@@ -153,7 +154,10 @@ def brush(rng: np.random.Generator) -> Parts:
         x / length, (0, 0.15, 0.45, 0.8, 0.95, 1), np.array((0.46, 0.4, 0.17, 0.24, 0.2, 0.1)) * wide
     )
     grip = (
-        _band(x, np.maximum(half, 0.006), 0.6 * deep, 0.004).at(z=-0.3 * deep).turned(y_deg=90).at(z=-0.018)
+        _band(x, np.maximum(half, 0.006), 0.6 * deep, 0.004)
+        .at(z=-0.3 * deep)
+        .turned(y_deg=90, z_deg=90)
+        .at(z=-0.018)
     )
     parts = {"wood_handle": [grip], "metal_ferrule": [band], "yarn_bristles": [bristles]}
     if rng.random() < 0.6:
@@ -188,18 +192,19 @@ def scissors(rng: np.random.Generator) -> Parts:
     length, open_deg = rng.uniform(0.07, 0.14), rng.uniform(2, 25)
     width, loop = length * rng.uniform(0.1, 0.16), length * rng.uniform(0.16, 0.24)
     blades, grips = [], []
-    x = np.linspace(-0.45 * length, length, 18)
+    x = np.linspace(-0.45 * length - 0.5 * loop, length, 18)
     for side in (-1, 1):
         edge = np.interp(x / length, (-0.45, 0, 0.15, 1), (0.25, 0.5, 0.55, 0.04)) * width
-        spine, inner = np.c_[x, side * edge], np.c_[x, -side * 0.45 * edge]
+        aside = -side * np.interp(x, (x[0], -0.3 * length), (0.1 * loop + 0.005, 0))
+        spine, inner = np.c_[x, side * edge + aside], np.c_[x, -side * 0.45 * edge + aside]
         left, right = (spine, inner) if side > 0 else (inner, spine)
         blade = slab(left, right, 0.0022, 0.0004).at(z=0.0023 * (side > 0))
-        a = np.linspace(0, 2 * np.pi, 36, endpoint=False)
+        a, wire = np.linspace(0, 2 * np.pi, 36, endpoint=False), rng.uniform(0.003, 0.005)
         oval = np.c_[
             -0.45 * length - 0.95 * loop + loop * 1.25 * np.cos(a),
-            side * 0.7 * loop + 0.75 * loop * np.sin(a),
+            -side * (0.75 * loop + 0.005) + 0.75 * loop * np.sin(a),
         ]
-        ring = sweep(np.c_[oval, np.full(36, 0.0035)], rng.uniform(0.003, 0.005), 10, closed=True)
+        ring = sweep(np.c_[oval, np.full(36, 0.0035)], wire, 10, closed=True)
         blades.append(blade.turned(z_deg=side * open_deg / 2))
         grips.append(ring.turned(z_deg=side * open_deg / 2))
     rivet = cylinder(0.3 * width, 0.0064, 0.001, 20).at(z=-0.0008)
@@ -214,25 +219,25 @@ def pencils(rng: np.random.Generator) -> Parts:
     sides = 6 if rng.random() < 0.7 else 16
     a = 2 * np.pi * np.arange(sides) / sides
     fan = rng.uniform(0, 8)
-    for k in range(count):
-        length = rng.uniform(0.07, 0.18)
+    drawn = [(rng.uniform(0.07, 0.18), rng.normal(0, 3), rng.normal(0, 0.006)) for _ in range(count)]
+    turns = np.sort([fan * (k - count / 2) + turn for k, (_, turn, _) in enumerate(drawn)])
+    steepest = np.radians(np.maximum(np.abs(turns[1:]), np.abs(turns[:-1])))
+    y = np.r_[0, np.cumsum(2.2 * radius / np.cos(steepest))]
+    for k, (length, _, slid) in enumerate(drawn):
         shaft = plate(radius * np.c_[np.cos(a), np.sin(a)], length, 0.0002)
         tip = lathe([(0, 0), (0.97 * radius, 0), (0.27 * radius, 3.2 * radius), (0, 3.2 * radius)], 16).at(
             z=length
         )
         lead = lathe([(0, 0), (0.26 * radius, 0), (0.08 * radius, 0.9 * radius), (0, radius)], 10)
         end = cylinder(1.02 * radius, 0.012, 0.001, 16).at(z=-0.011)
-        turn, place = (
-            fan * (k - count / 2) + rng.normal(0, 3),
-            (rng.normal(0, 0.006), 2.2 * radius * (k - count / 2)),
-        )
         for name, part in (
             ("shaft" if k % 2 else "shaft_other", shaft),
             ("wood_cone", tip),
             ("lead", lead.at(z=length + 3.2 * radius)),
             ("end", end),
         ):
-            parts[name].append(part.turned(z_deg=30, y_deg=90).turned(z_deg=turn).at(*place, radius))
+            lying = part.turned(z_deg=30).turned(y_deg=90).at(0.018 + slid)
+            parts[name].append(lying.turned(z_deg=float(turns[k])).at(0, float(y[k]), radius))
     return parts
 
 

@@ -123,15 +123,17 @@ def gears(rng: np.random.Generator) -> Parts:
     wheels, axles = [], []
     x = y = 0.0
     way = rng.uniform(0, 6.3)
-    previous = 0.0
+    previous, spin, driver = 0.0, 0.0, 0
     for k in range(int(rng.integers(2, 5))):
         teeth = int(rng.integers(9, 30))
         radius = teeth * pitch / np.pi
         if k:
             way += rng.uniform(-1.1, 1.1)
             x, y = x + (radius + previous) * np.cos(way), y + (radius + previous) * np.sin(way)
-        tall = rng.uniform(0.006, 0.012)
-        wheels += [p.at(x, y, 0.005 + 0.0003 * k) for p in _gear(rng, teeth, radius, 0.42 * pitch, tall)]
+            spin = way + np.pi - (np.pi - driver * (way - spin)) / teeth  # a tooth meets a gap
+        tall, driver = rng.uniform(0.006, 0.012), teeth
+        gear = _gear(rng, teeth, radius, 0.42 * pitch, tall)
+        wheels += [p.turned(z_deg=float(np.degrees(spin))).at(x, y, 0.005 + 0.0003 * k) for p in gear]
         axles.append(cylinder(0.16 * radius, tall + 0.012, 0.001, 20).at(x, y, 0.0003))
         previous = radius
     low = np.min([w.vertices.min(0) for w in wheels], axis=0)
