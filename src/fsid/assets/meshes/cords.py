@@ -55,7 +55,7 @@ def cable(rng: np.random.Generator) -> Parts:
     thick = rng.uniform(0.002, 0.005)
     path = _lying_rand(rng, 2.2 * thick, 240)
     plugs, metal = [], []
-    for end, inner in ((path[0], path[3]), (path[-1], path[-4])):
+    for end, inner, hair in ((path[0], path[3], 0.0), (path[-1], path[-4], 0.0004)):
         heading = np.degrees(np.arctan2(*(end - inner)[1::-1]))
         size = thick * rng.uniform(2.2, 3.5)
         body = box(3.5 * size, 1.8 * size, size, 0.3 * size, 3).at(1.5 * size)
@@ -74,9 +74,9 @@ def cable(rng: np.random.Generator) -> Parts:
             ]
         else:
             pins = [box(1.4 * size, 1.2 * size, 0.5 * size, 0.0004, 1).at(3.8 * size, 0, 0.25 * size)]
-        low = float(end[2]) - size / 2
-        plugs += [p.turned(z_deg=heading).at(end[0], end[1], max(low, 0)) for p in (body, *relief)]
-        metal += [p.turned(z_deg=heading).at(end[0], end[1], max(low, 0)) for p in pins]
+        low = max(float(end[2]) - size / 2, 0.0) + hair
+        plugs += [p.turned(z_deg=heading).at(end[0], end[1], low) for p in (body, *relief)]
+        metal += [p.turned(z_deg=heading).at(end[0], end[1], low) for p in pins]
     return {"rubber_cable": [sweep(path, thick, 8)], "plastic_plugs": plugs, "metal_pins": metal}
 
 
@@ -226,26 +226,35 @@ def _lying_rand(rng: np.random.Generator, gap: float, count: int) -> np.ndarray:
     t = np.linspace(0, 1, count)
     kind = int(rng.integers(3))
     if kind == 0:
-        turns = rng.uniform(2.5, 6)
-        angle = 2 * np.pi * turns * t
+        angle = 2 * np.pi * rng.uniform(2.5, 6) * t
         r = gap * 1.06 * (1.2 + angle / (2 * np.pi))
-        return np.c_[r * np.cos(angle), r * np.sin(angle), np.full(count, gap / 2)]
+        return _lifted(np.c_[r * np.cos(angle), r * np.sin(angle)], gap)
     if kind == 1:
-        turns = rng.uniform(3, 7)
-        angle = 2 * np.pi * turns * t
+        angle = 2 * np.pi * rng.uniform(3, 7) * t
         r = gap * rng.uniform(8, 14) * (1 + 0.12 * np.sin(2.3 * angle) + 0.06 * t)
-        squash = rng.uniform(0.4, 1)
-        high = gap * (0.5 + 0.75 * turns * t + 0.3 * np.sin(1.7 * angle))
-        return np.c_[r * np.cos(angle), squash * r * np.sin(angle), np.maximum(high, gap / 2)]
+        return _lifted(np.c_[r * np.cos(angle), rng.uniform(0.4, 1) * r * np.sin(angle)], gap)
     way = np.zeros(count)
     for k in range(1, 6):
         way += rng.normal(0, 2.4 / k) * np.sin(np.pi * k * t + rng.uniform(0, 6.3))
     step = gap * rng.uniform(30, 60) / count
-    return np.c_[
-        np.cumsum(np.cos(way)) * step,
-        np.cumsum(np.sin(way)) * step,
-        gap * (0.5 + 0.6 * (t + np.abs(np.sin(9 * t)))),
-    ]
+    return _lifted(np.c_[np.cumsum(np.cos(way)) * step, np.cumsum(np.sin(way)) * step], gap)
+
+
+def _lifted(plan: np.ndarray, gap: float) -> np.ndarray:
+    """(n, 3) path above `plan` (n, 2) of a cord of thickness `gap`: on the floor, or on itself."""
+    walked = np.r_[0, np.cumsum(np.linalg.norm(np.diff(plan, axis=0), axis=1))]
+    along = walked[:, None] - walked
+    across = np.linalg.norm(plan[:, None] - plan, axis=-1)
+    on = np.where(along > 2.5 * gap, gap**2 - across**2, -1.0)
+    rise = np.where(on > 0, np.sqrt(np.maximum(on, 0)), -np.inf)
+    z = np.full(len(plan), gap / 2)
+    for _ in range(12):
+        held = np.maximum(z, (z + rise).max(1))
+        ramp = (held - 0.5 * np.abs(along)).max(1)
+        if np.allclose(ramp, z, atol=1e-3 * gap):
+            break
+        z = ramp
+    return np.c_[plan, z]
 
 
 def _around(path: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -75,12 +75,19 @@ def pendant_lamp(rng: np.random.Generator) -> Parts:
     flex = sweep(np.c_[sag, 0 * t, top * 0.55 + t * (cord + top * 0.45)], 0.0028, 8)
     socket = cone(0.016, 0.022, 0.05, 0.003, 24).at(z=0.5 * top)
     rose = cone(0.05, 0.02, 0.03, 0.004, 32).at(z=top + cord)
+    mouth = np.concatenate([s.vertices for s in shades])
+    wide = 1.98 * float(np.hypot(*mouth[mouth[:, 2] > top - 0.003, :2].T).max())
+    spokes = [box(wide, 0.003, 0.002, 0.0005, 1).turned(z_deg=60 * k).at(z=top - 0.004) for k in range(3)]
     return {
         "shade": shades,
         "cord": [flex],
-        "socket": [socket, rose],
-        "bulb": [ball(0.028, 3).at(z=0.43 * top)],
+        "socket": [socket, rose, *(s.at(z=0.0004 * k) for k, s in enumerate(spokes))],
+        "bulb": [ball(0.028, 3).at(z=0.5 * top - 0.022)],
     }
+
+
+_RING = ((1.0, 0.0), (0.875, 0.5), (0.75, 1.0))
+"""Share of the radius and of the height of a ring of stacked rings, from below."""
 
 
 def _shades_rand(rng: np.random.Generator, size: float) -> list[Solid]:
@@ -105,6 +112,8 @@ def _shades_rand(rng: np.random.Generator, size: float) -> list[Solid]:
     rings = int(rng.integers(3, 8))
     tall = 2 * size / rings
     widths = size * (0.5 + 0.5 * np.sin(np.pi * (np.arange(rings) + rng.uniform(0.3, 1)) / rings))
+    steps = np.array([(w * s, 0.0, (k + 0.8 * h) * tall) for k, w in enumerate(widths) for s, h in _RING])
+    wire = sweep(steps * (0.995, 1, 1), 0.0012, 6)
     return [
         hollow(
             w * np.linspace(1, 0.75, 4),
@@ -114,7 +123,7 @@ def _shades_rand(rng: np.random.Generator, size: float) -> list[Solid]:
             segments=36,
         ).at(z=k * tall)
         for k, w in enumerate(widths)
-    ]
+    ] + [wire.turned(z_deg=120 * k) for k in range(3)]
 
 
 @mesh_family("candle")

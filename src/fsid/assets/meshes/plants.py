@@ -46,8 +46,10 @@ def potted_plant(rng: np.random.Generator) -> Parts:
             turn = rotation_matrix(rng.normal(0, 25), rng.uniform(-60, 25), rng.uniform(0, 360))
             turns.append(turn * rng.uniform(0.5, 1.2))
             places.append(path[k])
-    leaves = copies(leaf, np.array(turns), np.array(places))
-    return {"pot": [pot], "soil": [soil], "leaf_stems": [stems], "leaf": [leaves]}
+    free = _free(leaf, np.array(turns), np.array(places), 0.9 * radius, float(pot.vertices[:, 2].max()))
+    leaves = copies(leaf, np.array(turns)[free], np.array(places)[free])
+    parts = {"pot": [pot], "soil": [soil], "leaf_stems": [stems], "leaf": [leaves]}
+    return {name: solids for name, solids in parts.items() if len(solids[0].faces)}
 
 
 @mesh_family("rosette")
@@ -114,7 +116,7 @@ def flower(rng: np.random.Generator) -> Parts:
     s = np.linspace(0, 1, 12)
     petals: list[Solid] = []
     hearts: list[Solid] = []
-    stems, leaves = [], []
+    stems, turns, places = [], [], []
     leaf = leaf_rand(rng, int(rng.integers(3)), 0.3 * tall)
     for k in range(count):
         aim, lean, high = rng.uniform(0, 360), rng.uniform(2, 24) * (k > 0), tall * rng.uniform(0.75, 1)
@@ -126,17 +128,20 @@ def flower(rng: np.random.Generator) -> Parts:
             grown = Solid(part.vertices * scale, part.normals, part.faces)
             bits.append(grown.turned(y_deg=1.3 * lean + rng.normal(0, 8)).turned(z_deg=aim).at(*path[-1]))
         for at in rng.integers(3, 9, 2):
-            turned = leaf.turned(rng.normal(0, 10), rng.uniform(-65, -20), rng.uniform(0, 360))
-            leaves.append(turned.at(*path[at]))
-    parts = {"petal": petals, "blossom": hearts, "leaf_stems": stems, "leaf": leaves}
+            turns.append(rotation_matrix(rng.normal(0, 10), rng.uniform(-65, -20), rng.uniform(0, 360)))
+            places.append(path[at])
+    free = np.ones(len(turns), bool)
+    vase: list[Solid] = []
     if rng.random() < 0.5:
         z = np.linspace(0, 1, 16)
         outer = (0.03 + 0.012 * count**0.5) * (
             1 + rng.normal(0, 0.35) * (z - 0.5) ** 2 - 0.25 * np.sin(np.pi * z)
         )
-        parts["glass_vase"] = [hollow(outer, 0.45 * tall * z, 0.003, segments=40).at(z=0.004)]
-        parts = {k: v if k == "glass_vase" else [p.at(z=0.012) for p in v] for k, v in parts.items()}
-    return parts
+        free = _free(leaf, np.array(turns), np.array(places), 0.85 * float(outer[-1]), 0.45 * tall)
+        vase = [hollow(outer, 0.45 * tall * z, 0.003, segments=40).at(z=-0.008)]
+    foliage = [copies(leaf, np.array(turns)[free], np.array(places)[free])] if free.any() else []
+    parts = {"petal": petals, "blossom": hearts, "leaf_stems": stems, "leaf": foliage, "glass_vase": vase}
+    return {name: solids for name, solids in parts.items() if solids}
 
 
 @mesh_family("branch")
@@ -192,7 +197,9 @@ def bush(rng: np.random.Generator) -> Parts:
     ends = spots[: int(rng.integers(12, 30)), None]
     middle = ends * (0.25, 0.25, 0.6) + rng.normal(0, 0.01, (len(ends), 1, 3))
     stems = tubes(2 * s * (1 - s) * middle + s**2 * ends, np.linspace(0.008, 0.002, 6), 6)
-    return {"wood_bark": [stems], "leaf": [copies(leaf.turned(y_deg=-90), turns, spots)]}
+    leaf = leaf.turned(y_deg=-90)
+    free = _free(leaf, turns, spots, 0.0, 0.0)
+    return {"wood_bark": [stems], "leaf": [copies(leaf, turns[free], spots[free])]}
 
 
 @mesh_family("mushrooms")
@@ -253,6 +260,14 @@ def leaf_rand(rng: np.random.Generator, kind: int, length: float) -> Solid:
         0.45 * np.sqrt(np.clip(1 - (2 * np.clip((t - 0.35) / 0.65, 0, 1) - 1) ** 2, 0, 1)),
     )[kind]
     return _grid_leaf(half + 0.006, fold, droop, 5, length)
+
+
+def _free(leaf: Solid, turns: np.ndarray, places: np.ndarray, wall: float, rim: float) -> np.ndarray:
+    """(n,) bool: which copies of `leaf` stay above the floor, and out of a wall of that radius and height."""
+    points = np.einsum("nij,vj->nvi", turns, leaf.vertices) + places[:, None]
+    beside, high = np.hypot(points[..., 0], points[..., 1])[:, leaf.faces], points[:, leaf.faces, 2]
+    through = (beside.min(2) < wall) & (beside.max(2) > wall) & (high.min(2) < rim)
+    return (points[..., 2].min(1) > 0) & ~through.any(1)
 
 
 def _oval(t: np.ndarray) -> np.ndarray:
