@@ -12,6 +12,7 @@ import pytest
 from scipy.spatial import ConvexHull, cKDTree
 
 from fsid.assets import PART_KINDS, Mesh, build_mesh, mesh_families, part_kind, registry
+from fsid.assets.meshes.cords import _lying_rand
 from fsid.assets.meshes.soft import pillow
 from fsid.assets.solids import Solid
 from fsid.assets.streams import rng_of
@@ -232,10 +233,12 @@ def points_on(solid: Solid, step: float) -> np.ndarray:
     return np.concatenate(points)
 
 
-@pytest.mark.parametrize("family", ["armchair", "bench", "office_chair", "parcel", "scissors"])
+@pytest.mark.parametrize(
+    "family", ["armchair", "bench", "office_chair", "parcel", "pendant_lamp", "scissors"]
+)
 def test_all_of_a_thing_hangs_together(family):
     """From any of its solids a path of solids that touch leads to any other: nothing is held by nothing."""
-    for seed in (1, 2):
+    for seed in (1, 2, 6):
         solids = [s for group in solids_of(family, seed).values() for s in group]
         step = 0.008 * float(np.ptp(np.concatenate([s.vertices for s in solids]), axis=0).max())
         clouds = [points_on(s, step) for s in solids]
@@ -314,6 +317,47 @@ def test_a_cushion_has_no_wrinkles_where_its_piping_is(rng):
     seam = np.abs(plain.vertices[:, 2]) < 1e-9
     assert seam.sum() > 16
     np.testing.assert_allclose(wrinkled.vertices[seam], plain.vertices[seam], atol=1e-9)
+
+
+def test_a_lying_cord_is_on_the_floor_or_on_itself():
+    """And never in itself: strands that cross are one thickness apart."""
+    bare = 0
+    for seed in range(12):
+        path = _lying_rand(np.random.default_rng(seed), 0.01, 260)
+        walked = np.r_[0, np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))]
+        far = np.abs(walked[:, None] - walked) > 0.04
+        assert np.linalg.norm(path[:, None] - path, axis=-1)[far].min() > 0.0085
+        assert path[:, 2].min() == pytest.approx(0.005)
+        if np.linalg.norm(path[:, None, :2] - path[:, :2], axis=-1)[far].min() > 0.01:
+            np.testing.assert_allclose(path[:, 2], 0.005)
+            bare += 1
+    assert bare
+
+
+@pytest.mark.parametrize(("family", "foot"), [("potted_plant", "pot"), ("bush", "wood_bark")])
+def test_no_leaf_holds_a_plant_above_the_floor(family, foot):
+    for seed in range(20):
+        parts = solids_of(family, seed)
+        low = {name: min(float(s.vertices[:, 2].min()) for s in group) for name, group in parts.items()}
+        assert low[foot] < low["leaf"] + 0.01, seed
+
+
+def test_leaves_do_not_pass_through_a_vase():
+    """No triangle of a leaf is partly within and partly without the cylinder of its mouth, below its rim."""
+    vases = 0
+    for seed in range(12):
+        parts = solids_of("flower", seed)
+        if "glass_vase" not in parts or "leaf" not in parts:
+            continue
+        vases += 1
+        vase, leaf = parts["glass_vase"][0], parts["leaf"]
+        rim = float(vase.vertices[:, 2].max())
+        mouth = float(np.hypot(*vase.vertices[vase.vertices[:, 2] > rim - 0.004, :2].T).max())
+        corner = np.concatenate([s.vertices[s.faces] for s in leaf])
+        reach = np.hypot(corner[..., 0], corner[..., 1])
+        crosses = (reach.min(1) < 0.85 * mouth) & (reach.max(1) > 0.87 * mouth)
+        assert not (crosses & (corner[..., 2].max(1) < rim - 0.01)).any()
+    assert vases
 
 
 def test_a_brush_has_a_handle_as_wide_as_its_ferrule():
