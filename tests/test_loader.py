@@ -348,6 +348,17 @@ def test_without_settings_samples_say_themselves_which_scene_they_are_of(tmp_pat
         index_mosaics(write_stated(tmp_path, [[]]))
 
 
+def test_a_picture_that_two_datasets_share_is_of_one_split(tmp_path: Path) -> None:
+    """Each second of a.png, c.png is for validation, and each second of a.png, b.png, c.png."""
+    albums = (("a.png", "c.png"), ("a.png", "b.png", "c.png"))
+    numbered = [pair for album in albums for pair in enumerate(album)]
+    records = [{"image": name, "split": ("train", "validation")[i % 2]} for i, name in numbered]
+    data = write_stated(tmp_path, [*records, {"image": "d.png", "split": "train"}])
+    splits = {name: {m.split for m in index_mosaics(data) if m.scene == i} for i, name in enumerate("acbd")}
+    assert splits == {"a": {"train"}, "c": {"validation"}, "b": {"validation"}, "d": {"train"}}
+    assert PatchDataset(data, CONFIG, seed=0).mosaics == 3
+
+
 def test_a_key_that_comes_twice_is_refused(tmp_path: Path) -> None:
     """Two datasets in one folder: which noisy image belongs to which clean one would be a guess."""
     image = raw(np.zeros((HEIGHT, WIDTH)))

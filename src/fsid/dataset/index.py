@@ -11,7 +11,7 @@ from __future__ import annotations
 import hashlib
 import re
 import tarfile
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -88,7 +88,14 @@ def index_mosaics(data_dir: str | Path, kind: MosaicKind = "clean") -> tuple[Sto
         raise FsidError(
             f"{data_dir}: its shards hold no *.{kind}.dng; make the dataset again with `fsid generate`"
         )
-    return tuple(found.values())
+    return _split_by_scene(found.values())
+
+
+def _split_by_scene(mosaics: Collection[StoredMosaic]) -> tuple[StoredMosaic, ...]:
+    """All of a scene are for validation where one is: datasets in one folder may share pictures, and each
+    counts its own to say which are."""
+    kept = {mosaic.scene for mosaic in mosaics if mosaic.split == "validation"}
+    return tuple(replace(m, split="validation") if m.scene in kept else m for m in mosaics)
 
 
 def identity(data_dir: Path) -> str:
