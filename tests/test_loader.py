@@ -348,6 +348,13 @@ def test_without_settings_samples_say_themselves_which_scene_they_are_of(tmp_pat
         index_mosaics(write_stated(tmp_path, [[]]))
 
 
+def test_samples_that_say_nothing_of_their_scene_are_one_each(tmp_path: Path) -> None:
+    """Pairs of one's own, beside a scene of the dataset that counts as the first."""
+    data = write_stated(tmp_path, [{}, {"seed": 5, "frame": 0}, {}, {}])
+    assert [mosaic.scene for mosaic in index_mosaics(data)] == [0, 1, 2, 3]
+    assert PatchDataset(data, replace(CONFIG, held_out=1), seed=0).mosaics == 3
+
+
 def test_a_picture_that_two_datasets_share_is_of_one_split(tmp_path: Path) -> None:
     """Each second of a.png, c.png is for validation, and each second of a.png, b.png, c.png."""
     albums = (("a.png", "c.png"), ("a.png", "b.png", "c.png"))

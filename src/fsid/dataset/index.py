@@ -148,7 +148,7 @@ def _origin(data_dir: Path) -> Callable[[StoredMosaic], tuple[int, str]]:
 def _origin_by_json() -> Callable[[StoredMosaic], tuple[int, str]]:
     """Scenes are numbered as they come, by seed and frame or by the name of their picture.
 
-    What has no JSON, or one that says nothing of it, is for training, and its scene is the number in its key.
+    What has no JSON, or one that says nothing of it, is for training and a scene by itself.
     """
     scenes: dict[str, int] = {}
 
@@ -161,9 +161,7 @@ def _origin_by_json() -> Callable[[StoredMosaic], tuple[int, str]]:
 
     def origin(mosaic: StoredMosaic) -> tuple[int, str]:
         scene, split = stated(mosaic.shard).get(mosaic.key, ("", "train"))
-        if scene:
-            return scenes.setdefault(scene, len(scenes)), split
-        return int(mosaic.key) if SAMPLE_KEY.fullmatch(mosaic.key) else 0, split
+        return scenes.setdefault(scene or f"sample {mosaic.key}", len(scenes)), split
 
     return origin
 
