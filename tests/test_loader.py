@@ -38,6 +38,7 @@ from fsid.sensor import (  # noqa: E402
     write_dng,
 )
 from fsid.sensor.noise import K_JITTER, SIGMA2_JITTER, level_rand  # noqa: E402
+from stated_black import state_black  # noqa: E402
 
 HEIGHT, WIDTH = 40, 60
 CONFIG = PatchConfig(size_px=16, batch=3, profiles=("pixel6", "galaxy-s22"), iso_min=400, iso_max=6400)
@@ -428,6 +429,20 @@ def test_levels_that_are_no_range_are_named(
         FsidError, match=rf"00000000\.clean\.dng: black level {black} and white level {white}"
     ):
         index_mosaics(tmp_path)
+
+
+@pytest.mark.parametrize(("numerator", "named"), [(6400, ""), (6450, r"states 64\.5; one whole number")])
+def test_levels_are_what_a_rational_says(numerator: int, named: str, tmp_path: Path) -> None:
+    """Black levels as phones state them: 6400 / 100 is 64, and no training takes 64.5 for another number."""
+    file = tmp_path / "phone.dng"
+    write_dng(file, raw(np.full((HEIGHT, WIDTH), 30_000), black=64))
+    state_black(file, numerator, 100)
+    write_shard(shard_path(tmp_path, 0), [("00000000", {"clean.dng": file.read_bytes()})])
+    if named:
+        with pytest.raises(FsidError, match=rf"00000000\.clean\.dng is not a DNG of this dataset .*{named}"):
+            index_mosaics(tmp_path)
+    else:
+        assert index_mosaics(tmp_path)[0].black_level == read_raw(file).black_level == 64
 
 
 def addresses(tmp_path: Path, per_shard: tuple[int, ...]) -> Path:

@@ -30,6 +30,7 @@ from fsid.sensor import dng_tags
 from fsid.sensor.mosaic import check_cfa
 from fsid.sensor.quantise import check_levels
 from fsid.sensor.raw import NoiseLevel
+from fsid.sensor.tiff import quotients
 
 _ORIGIN_KEYS = ("crops", "exposures", "noise_levels", "validation_every")
 """Settings that say which scene a sample is from; others may be those of another version of FSID."""
@@ -193,8 +194,8 @@ def _read_header(shard: Path, member: tarfile.TarInfo, key: str) -> StoredMosaic
                 height=page.imagelength,
                 width=page.imagewidth,
                 cfa=check_cfa("".join("RGB"[colour] for colour in bytes(tags[dng_tags.CFA_PATTERN])), where),
-                black_level=_level(tags[dng_tags.BLACK_LEVEL]),
-                white_level=_level(tags[dng_tags.WHITE_LEVEL]),
+                black_level=_level(page.tags[dng_tags.BLACK_LEVEL]),
+                white_level=_level(page.tags[dng_tags.WHITE_LEVEL]),
                 noise=dng_tags.noise_level(tags),
             )
             plain = dng.byteorder == "<" and page.compression == 1 and page.dtype == "uint16"
@@ -230,7 +231,11 @@ def _mosaic_page(dng: tifffile.TiffFile) -> tifffile.TiffPage:
     )
 
 
-def _level(value: object) -> int:
-    """A level tag may be one number, one per site, or a rational (numerator, denominator)."""
-    numbers = value if isinstance(value, tuple) else (value,)
-    return int(numbers[0])
+def _level(tag: tifffile.TiffTag) -> int:
+    """A level tag holds one number or one per site, each of them perhaps a rational; here all are one DN."""
+    values = tag.value if isinstance(tag.value, tuple) else (tag.value,)
+    levels = quotients(values) if tag.dtype == tifffile.DATATYPE.RATIONAL else values
+    if len(set(levels)) != 1 or levels[0] != int(levels[0]):
+        stated = ", ".join(f"{level:g}" for level in levels) or "no number"
+        raise ValueError(f"its {tag.name} states {stated}; one whole number is needed")
+    return int(levels[0])
