@@ -473,6 +473,23 @@ def test_a_bad_setting_names_its_key(group, key, value):
         group(**{key: value})
 
 
+def test_shares_that_are_accepted_can_be_drawn_from():
+    """Thirds of seven digits sum to 1 - 1e-7."""
+    thirds = (0.3333333, 0.3333333, 0.3333333)
+    config = SceneConfig(
+        objects=(1, 1),
+        mesh_families=("toy_blocks",),
+        materials=MaterialConfig(palette_shares=(*thirds, 0.0), cast_share=0.0),
+        background=BackgroundConfig(kind_shares=(*thirds, 0.0)),
+        lights=LightConfig(kind_shares=thirds),
+    )
+    assert {scene(seed, config=config).background.kind for seed in range(20)} == {
+        "room",
+        "backdrop",
+        "tabletop",
+    }
+
+
 def test_a_list_does_where_two_values_or_names_are_asked_for():
     given = SceneConfig(objects=[2, 3], mesh_families=["mug", "vase"], lights=LightConfig(count=[1, 1]))
     meant = SceneConfig(objects=(2, 3), mesh_families=("mug", "vase"), lights=LightConfig(count=(1, 1)))

@@ -20,6 +20,11 @@ def pick_rand(rng: np.random.Generator, names: tuple[str, ...]) -> str:
     return names[int(_mixed(_hashes(names) ^ key).argmax())]
 
 
+def share_rand(rng: np.random.Generator, shares: tuple[float, ...]) -> int:
+    """An index of `shares`, drawn as often as they say; they sum to 1, or nearly, as written by hand."""
+    return int(rng.choice(len(shares), p=np.array(shares) / sum(shares)))
+
+
 def log_uniform_rand(rng: np.random.Generator, limits: tuple[float, float]) -> float:
     """A number whose logarithm is uniform between the two positive limits."""
     return float(np.exp(rng.uniform(*np.log(limits))))

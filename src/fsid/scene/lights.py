@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fsid.scene.choice import log_uniform_rand
+from fsid.scene.choice import log_uniform_rand, share_rand
 from fsid.scene.colour import LUMINANCE, blackbody_rgb
 from fsid.scene.config import LightConfig
 from fsid.scene.model import Light, Sky, Vec3
@@ -81,7 +81,7 @@ def _lamp_rand(
     irradiance: float,
 ) -> Light:
     """One lamp above the focus that gives it the irradiance."""
-    kind = KINDS[int(rng.choice(len(KINDS), p=config.kind_shares))]
+    kind = KINDS[share_rand(rng, config.kind_shares)]
     direction = direction_of(rng.uniform(0, 360), rng.uniform(30, 85))
     distance = rng.uniform(*config.distance_m)
     rgb = _lamp_colour_rand(rng, config)

@@ -17,7 +17,7 @@ from fsid.assets import (
     material_tile_m,
     part_kind,
 )
-from fsid.scene.choice import log_uniform_rand, pick_rand
+from fsid.scene.choice import log_uniform_rand, pick_rand, share_rand
 from fsid.scene.colour import PALETTES, Mood, albedo_rgb, calmed, lab_rand, mood_rand, related_rand
 from fsid.scene.config import SceneConfig
 from fsid.scene.knobs import Range
@@ -48,7 +48,7 @@ def cast_rand(rng: np.random.Generator, config: SceneConfig) -> Material | None:
     """The paint of all objects of a scene, of one colour; None where they have materials of their own."""
     knobs = config.materials
     cast, mood = rng.random() < knobs.cast_share, mood_rand(rng, knobs.calm_share, knobs.variation)
-    lab = lab_rand(rng, PALETTES[int(rng.choice(len(PALETTES), p=_CAST_PALETTES))], mood)
+    lab = lab_rand(rng, PALETTES[share_rand(rng, _CAST_PALETTES)], mood)
     colour = vec3(albedo_rgb(lab[None], *knobs.albedo)[0])
     return replace(PLAIN, colours=(colour,) * 3) if cast else None
 
@@ -128,7 +128,7 @@ def _finished_rand(
 def _colours_rand(rng: np.random.Generator, config: SceneConfig, mood: Mood) -> tuple[Vec3, Vec3, Vec3]:
     """A colour, one of the same stuff, and one that stands out."""
     knobs = config.materials
-    palette = PALETTES[int(rng.choice(len(PALETTES), p=knobs.palette_shares))]
+    palette = PALETTES[share_rand(rng, knobs.palette_shares)]
     contrast = float(rng.uniform(*knobs.contrast))
     base = lab_rand(rng, palette, mood)
     related = base + contrast * (related_rand(rng, base) - base)

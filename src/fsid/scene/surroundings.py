@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fsid.assets import BACKGROUND_PARTS, sweep_radius_m, table_size_m
+from fsid.scene.choice import share_rand
 from fsid.scene.colour import Mood, mood_rand
 from fsid.scene.config import SceneConfig
 from fsid.scene.materials import surface_rand
@@ -42,7 +43,7 @@ def background_rand(rng: np.random.Generator, config: SceneConfig) -> tuple[Back
     which = int(rng.integers(2**62))
     if config.backgrounds:
         rng = np.random.default_rng((_FIXED_BACKGROUNDS, which % config.backgrounds))
-    kind = KINDS[int(rng.choice(len(KINDS), p=config.background.kind_shares))]
+    kind = KINDS[share_rand(rng, config.background.kind_shares)]
     sizes = rng.random(5)
     mood = mood_rand(rng, config.materials.calm_share, config.materials.variation)
     materials = {
