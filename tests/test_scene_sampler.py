@@ -7,7 +7,15 @@ import numpy as np
 import pytest
 import trimesh
 
-from fsid.assets import BACKGROUND_PARTS, build_mesh, material_families, mesh_families, part_kind, registry
+from fsid.assets import (
+    BACKGROUND_PARTS,
+    build_mesh,
+    ground_height_m,
+    material_families,
+    mesh_families,
+    part_kind,
+    registry,
+)
 from fsid.assets.solids import box, rotation_matrix
 from fsid.errors import FsidError
 from fsid.scene import (
@@ -385,6 +393,27 @@ def test_what_is_far_lies_behind_the_rest_as_the_camera_sees_it():
         assert np.mean(cosine > np.cos(1.0)) > 0.9
         distances += list(np.linalg.norm(offsets, axis=1))
     assert np.quantile(distances, 0.9) > 8
+
+
+def test_what_lies_in_the_hills_lies_on_them():
+    """As deep in the ground as on the plain, where hills are nearer and higher than by default."""
+    background = BackgroundConfig(kind_shares=(0, 0, 0, 1), ground_m=(60.0, 60.0), hills_m=(20.0, 20.0))
+    placement = PlacementConfig(far_share=1.0, floating_share=0.0, far_factor=30.0, upright_share=1.0)
+    config = dataclasses.replace(CONFIG, objects=(30, 30), background=background, placement=placement)
+    raised = 0
+    for seed in SEEDS:
+        s = scene(seed, config=config)
+        for o, t in zip(s.objects, s.transforms, strict=True):
+            points = surface_points(o.family, o.seed) * np.array(t.scale)[:, None]
+            points = rotation_matrix(*t.rotation_deg) @ points + np.array(t.position_m)[:, None]
+            height = points[2] - points[2].min()
+            foot = points[:, height <= 0.1 * height.max()]
+            ground_m = ground_height_m(s.background.size_m, foot[0], foot[1])
+            raised += ground_m.min() > 0.5
+            diagonal_m = np.linalg.norm(np.ptp(points, axis=1))
+            if ground_m.min() > 0:
+                assert -0.03 * diagonal_m < points[2].min() - ground_m.min() < 0.001
+    assert raised > 20
 
 
 def test_views_towards_the_sky_have_the_horizon_where_it_is_asked_for():

@@ -179,6 +179,7 @@ def _placed(
         else:
             lift_m = relief.rest_m(turned * np.float32(shrink), offset[:2], _PILE_LIMIT_M)
             offset[2] = lift_m - _SINK * 2 * radius * shrink
+        offset[2] += relief.hill_m(turned * np.float32(shrink), offset[:2])
         gaps = np.linalg.norm(keep_clear_m - (middle * shrink + offset), axis=1)
         if (gaps * _CLEARANCE >= radius * shrink).all():
             break

@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from fsid.assets import build_mesh
+from fsid.assets import build_mesh, ground_height_m
 from fsid.assets.surfaces import cross
 from fsid.scene.surroundings import Space
 
@@ -22,6 +22,8 @@ REACH_M = 2.4
 
 _SPREAD_POINTS = 1500
 _VERTICES = 1500
+_FOOT = 0.1
+"""Part of an object's height, from below, that is its foot."""
 
 
 @lru_cache(maxsize=256)
@@ -54,6 +56,7 @@ class Relief:
         self._ground = np.where(on_ground, np.float32(0.0), np.float32(space.floor_m))
         self._tops = self._ground.copy()
         self._floor_m = np.float32(space.floor_m)
+        self._open_air_m = space.open_air_m
 
     def rest_m(self, points: np.ndarray, place: np.ndarray, limit_m: float) -> float:
         """Height of an object of points (3, P), moved by place (2,), that rests on what is below limit_m."""
@@ -62,6 +65,17 @@ class Relief:
         supports = np.where(tops < limit_m, tops, ground) - points[2, inside]
         outside = self._floor_m - points[2, ~inside]
         return float(max(supports.max(initial=-np.inf), outside.max(initial=-np.inf)))
+
+    def hill_m(self, points: np.ndarray, place: np.ndarray) -> float:
+        """How far hills lift an object of points (3, P), moved by place (2,).
+
+        To the lowest ground under its foot, so that on a slope no part of that hangs in the air.
+        """
+        if self._open_air_m is None:
+            return 0.0
+        height = points[2] - points[2].min()
+        foot = points[:2, height <= _FOOT * height.max()] + place[:, None]
+        return float(ground_height_m(self._open_air_m, *foot).min())
 
     def add(self, points: np.ndarray) -> None:
         """Put down an object whose surface holds these points (3, P) of the world."""

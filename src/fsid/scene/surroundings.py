@@ -11,7 +11,7 @@ from fsid.scene.choice import share_rand
 from fsid.scene.colour import Mood, mood_rand
 from fsid.scene.config import SceneConfig
 from fsid.scene.materials import surface_rand
-from fsid.scene.model import Background
+from fsid.scene.model import Background, Vec3
 
 KINDS = ("room", "backdrop", "tabletop", "open-air")
 """The order of `BackgroundConfig.kind_shares`."""
@@ -24,12 +24,14 @@ class Space(NamedTuple):
     """Where things may be. low, high: (3,) corners of the box for cameras, lights and centres of objects.
 
     ground: (2,) half widths within which the ground is at z = 0. floor_m: height of the floor around it.
+    open_air_m: size of a background without walls, where hills rise out of the ground; else None.
     """
 
     low: np.ndarray
     high: np.ndarray
     ground: np.ndarray
     floor_m: float
+    open_air_m: Vec3 | None = None
 
     def reach(self, start: np.ndarray, direction: np.ndarray, wanted: float, margin: float = 0.0) -> float:
         """`wanted`, shortened so that start + direction * reach stays `margin` inside the box."""
@@ -58,7 +60,8 @@ def space_of(background: Background) -> Space:
     x, y, z = background.size_m
     half = np.array((x / 2, y / 2))
     if background.kind == "open-air":
-        return Space(np.array((-50.0, -50.0, 0.1)), np.array((50.0, 50.0, 50.0)), half, 0.0)
+        low, high = np.array((-50.0, -50.0, 0.1)), np.array((50.0, 50.0, 50.0))
+        return Space(low, high, half, 0.0, background.size_m)
     low, high = (
         np.array((0.2 - half[0], 0.2 - half[1], 0.1)),
         np.array((half[0] - 0.2, half[1] - 0.2, z - 0.2)),
