@@ -197,7 +197,11 @@ def terminated(
     arguments: list[str], begun: Callable[[], object], number: int = signal.SIGTERM
 ) -> tuple[int, str]:
     """Exit code and output of `fsid ARGUMENTS`, sent a signal when it has begun."""
-    process = subprocess.Popen([sys.executable, "-m", "fsid", *arguments], stderr=subprocess.PIPE)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "fsid", *arguments],
+        stderr=subprocess.PIPE,
+        preexec_fn=lambda: signal.signal(number, signal.SIG_DFL),  # nohup around the tests ignores SIGHUP
+    )
     while not begun():
         assert process.poll() is None, process.communicate()
         time.sleep(0.01)
