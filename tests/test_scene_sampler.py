@@ -416,6 +416,14 @@ def test_what_lies_in_the_hills_lies_on_them():
     assert raised > 20
 
 
+def test_nothing_lies_beyond_the_end_of_the_ground():
+    background = BackgroundConfig(kind_shares=(0, 0, 0, 1), ground_m=(20.0, 20.0))
+    placement = PlacementConfig(far_share=1.0, far_factor=30.0)
+    config = dataclasses.replace(CONFIG, objects=(20, 20), background=background, placement=placement)
+    for seed in SEEDS:
+        assert np.abs(boxes(scene(seed, config=config)).mean(1)[:, :2]).max() < 8.5
+
+
 def test_views_towards_the_sky_have_the_horizon_where_it_is_asked_for():
     """Half heights below the middle; from low down; and indoors nothing changes."""
     ground = BackgroundConfig(kind_shares=(0.0, 0.0, 0.0, 1.0))

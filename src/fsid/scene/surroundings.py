@@ -18,6 +18,8 @@ KINDS = ("room", "backdrop", "tabletop", "open-air")
 
 _FIXED_BACKGROUNDS = 7
 """Entropy of the K backgrounds of a config with K > 0: the same for every seed."""
+_WITHIN = 0.8
+"""Part of the half width of open ground within which things are: they are larger than their centres."""
 
 
 class Space(NamedTuple):
@@ -60,8 +62,8 @@ def space_of(background: Background) -> Space:
     x, y, z = background.size_m
     half = np.array((x / 2, y / 2))
     if background.kind == "open-air":
-        low, high = np.array((-50.0, -50.0, 0.1)), np.array((50.0, 50.0, 50.0))
-        return Space(low, high, half, 0.0, background.size_m)
+        edge = np.minimum(_WITHIN * half, 50.0)
+        return Space(np.array((*-edge, 0.1)), np.array((*edge, 50.0)), half, 0.0, background.size_m)
     low, high = (
         np.array((0.2 - half[0], 0.2 - half[1], 0.1)),
         np.array((half[0] - 0.2, half[1] - 0.2, z - 0.2)),
