@@ -105,6 +105,24 @@ def test_a_larger_count_keeps_the_whole_frames_of_a_shard_that_was_not_full(phot
     assert read_samples(path) == expected
 
 
+def test_a_smaller_count_in_between_leaves_nothing_unfinished(photos: Path, tmp_path: Path):
+    """Of a run that was killed before near-duplicates were settled and its card was written."""
+    config = small("width=64", "height=48", f"images={photos}")
+    generate(tmp_path, config, count=6, shard_size=2)
+    card = (tmp_path / "README.md").read_text()
+    assert "6 pairs for denoise" in card
+    (tmp_path / "README.md").unlink()
+    for count in (2, 6):
+        assert generate(tmp_path, config, count=count, shard_size=2) == 0
+    assert (tmp_path / "README.md").read_text() == card
+    shard_path(tmp_path, 1).unlink()
+    (tmp_path / "README.md").unlink()
+    generate(tmp_path, config, count=1, shard_size=2)
+    assert "2 pairs for denoise" in (tmp_path / "README.md").read_text()  # what follows a gap is not settled
+    assert generate(tmp_path, config, count=6, shard_size=2) == 2
+    assert (tmp_path / "README.md").read_text() == card
+
+
 def test_another_seed_gives_other_pictures(scenes: Path, tmp_path: Path):
     generate(tmp_path, small(), count=1, seed=8)
     assert read_member(shard_path(tmp_path, 0), "00000000.rgb.png") != read_member(

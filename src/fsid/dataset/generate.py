@@ -7,13 +7,13 @@ goes on where it stopped, and one that is running keeps others out of its folder
 
 from __future__ import annotations
 
+import itertools
 import operator
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import chain
 from pathlib import Path
 
 from fsid.assets import sky_sources
@@ -81,7 +81,7 @@ class _Shard:
     def do(self, worker: Worker) -> int:
         """Write the shard; number of its new samples."""
         kept = list(read_samples(self.path).items())[: self.kept] if self.kept else []
-        write_shard(self.path, chain(kept, self._samples(worker)))
+        write_shard(self.path, itertools.chain(kept, self._samples(worker)))
         return len(self.indices)
 
     def _samples(self, worker: Worker) -> Iterator[tuple[str, dict[str, bytes]]]:
@@ -135,12 +135,12 @@ def generate(
             for _, made in run(workforce.crew(len(todo)), todo, tasks_per_worker=tasks_per_worker, lost=lost):
                 done += made
                 progress(done, count)
-        shards = [shard_path(out, number) for number in range(-(-count // dataset.shard_size))]
 
         def redraw(task: Settle) -> None:
             list(run(workforce.crew(1), [task], tasks_per_worker=1, lost=lost))
 
         if todo or not (out / CARD).exists():
+            shards = list(_unbroken(out, dataset.shard_size))
             settle(shards, dataset.generate, dataset.seed, redraw)
             write_card(out, dataset, shards, command)
     return total
@@ -265,6 +265,19 @@ def _differing(there: dict, here: dict, path: str = "") -> Iterator[str]:
             yield from _differing(a, b, f"{path}{key}.")
         elif a != b:
             yield f"{path}{key} ({a} there, {b} here)"
+
+
+def _unbroken(out: Path, size: int) -> Iterator[Path]:
+    """The shards from the first one on, up to one that is not full or not there.
+
+    More than a smaller count asks for: where a card is, no larger one would settle them any more.
+    """
+    for path in (shard_path(out, number) for number in itertools.count()):
+        if not path.exists():
+            return
+        yield path
+        if count_whole(path) < size:
+            return
 
 
 def _missing(out: Path, dataset: DatasetConfig, count: int) -> Iterator[_Shard]:
