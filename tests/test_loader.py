@@ -558,6 +558,16 @@ def test_stored_noise_comes_with_its_level(tmp_path: Path, rng: np.random.Genera
     assert len(batch.k.unique(dim=0)) == 2
 
 
+@pytest.mark.parametrize(("width", "cfa"), [(WIDTH - 2, "RGGB"), (WIDTH, "BGGR")])
+def test_stored_noise_of_another_size_or_pattern_is_no_pair(width: int, cfa: str, tmp_path: Path) -> None:
+    """One window is cut out of both: R of the one would be B of the other."""
+    level = NoiseLevel(k=(1e-3,) * 4, sigma2=(1e-6,) * 4)
+    noisy = replace(raw(np.full((HEIGHT, width), 9000), cfa), noise=level)
+    data = write_pairs(tmp_path, [raw(np.full((HEIGHT, WIDTH), 9000))], [noisy])
+    with pytest.raises(FsidError, match=r"00000000 is no denoising pair, .* in size or CFA"):
+        PatchDataset(data, replace(CONFIG, noise="stored"), seed=0)
+
+
 def test_stored_noise_that_does_not_exist_is_named(dataset: Path) -> None:
     with pytest.raises(FsidError, match=r"no \*\.noisy\.dng"):
         PatchDataset(dataset, replace(CONFIG, noise="stored"), seed=0)

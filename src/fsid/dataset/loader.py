@@ -310,8 +310,10 @@ def _noisy_of(
         capture = noisy.get((clean.shard, clean.key))
         if capture is None or capture.noise is None:
             raise FsidError(f"{clean.shard}: {clean.key} has no noisy image that states its noise")
-        if (capture.height, capture.width) != (clean.height, clean.width):
-            raise FsidError(f"{clean.shard}: {clean.key} is no denoising pair, its two images differ in size")
+        if (capture.height, capture.width, capture.cfa) != (clean.height, clean.width, clean.cfa):
+            raise FsidError(
+                f"{clean.shard}: {clean.key} is no denoising pair, its two images differ in size or CFA"
+            )
         found[clean.shard, clean.key] = capture, capture.noise
     return found
 
