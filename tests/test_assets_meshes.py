@@ -384,7 +384,7 @@ def test_the_claw_of_a_hammer_bends_towards_its_handle():
 
 
 def test_teeth_of_gears_meet_gaps():
-    """No point of a rim lies deeper in the next wheel than a tenth of a tooth is high."""
+    """No point of a rim lies deeper in the next wheel than a quarter of a tooth is high."""
     for seed in range(6):
         rims = []
         for solid in solids_of("gears", seed)["metal_gears"]:

@@ -140,8 +140,8 @@ def scatter_rand(rng: np.random.Generator, count: int, gap: float) -> np.ndarray
 
 
 def spread(groups: Sequence[Sequence[Solid]], spots: np.ndarray) -> list[list[Solid]]:
-    """Each group of solids at its spot (n, 2), or farther out from the origin where another is in its way:
-    seen from above, circles around the groups do not overlap."""
+    """Each group of solids at its spot, or farther out from the origin where another is in its way: seen from
+    above, circles around the groups do not overlap. spots: (n, 2) metres."""
     placed: list[list[Solid]] = []
     circles: list[tuple[np.ndarray, float]] = []
     for group, spot in zip(groups, spots, strict=True):

@@ -69,7 +69,7 @@ def check_order(file: BinaryIO, directory: Mapping[int, Tag], path: Path) -> Non
         kind = "a tile wider than the image"
     elif any(n != 1 for code in _REORDERED if code in directory for n in directory[code].values):
         kind = "interleaved rows or columns"
-    elif is_jpeg and (n := _components(file, first(TILE_OFFSETS), first(WIDTH))) > 1:
+    elif is_jpeg and tiles and (n := _components(file, tiles[0], first(WIDTH))) > 1:
         kind = f"JPEGs of {n} components, {n} of which fill its width"
     else:
         return
