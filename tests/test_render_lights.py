@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import maximum_filter
 
 import fsid.assets.skies
 import fsid.render.sky
@@ -14,6 +15,7 @@ from fsid.assets import Mesh, survey_skies
 from fsid.errors import FsidError
 from fsid.render import Frame, Renderer
 from fsid.render.drawable import Drawable, View, background_drawable, panel_drawable, view_of
+from fsid.render.lamps import hoods_apart
 from fsid.render.room import light_sky
 from fsid.render.sky import angles, panorama
 from fsid.scene import SceneConfig, sample
@@ -179,6 +181,64 @@ def test_the_hood_of_a_lamp_shades_its_light(renderer: Renderer) -> None:
     share, aside = radiance[0.0] / radiance[0.5], np.abs(floor_points(camera)[..., :2]).max(-1)
     assert (share[aside < 0.7] < 0.01).all()
     np.testing.assert_allclose(share[aside > 1.3], 1.0, atol=0.01)
+
+
+def joined(*parts: Mesh) -> Mesh:
+    """Meshes of one part each as the parts of one mesh."""
+    starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    return Mesh(
+        vertices=np.concatenate([part.vertices for part in parts]),
+        normals=np.concatenate([part.normals for part in parts]),
+        faces=np.concatenate([p.faces + s for p, s in zip(parts, starts, strict=False)]).astype(np.int32),
+        face_parts=np.repeat(np.arange(len(parts), dtype=np.int32), [len(part.faces) for part in parts]),
+        part_names=tuple(f"part {i}" for i in range(len(parts))),
+    )
+
+
+def moved(mesh: Mesh, offset: Vec3) -> Mesh:
+    return replace(mesh, vertices=mesh.vertices + np.float32(offset))
+
+
+def test_a_display_lights_what_is_before_it_as_a_rectangle_does(renderer: Renderer) -> None:
+    """A slab on a case, 0.4 m x 0.3 m, that stands askew 0.2 m above a floor: E = L times the form factor of
+    its front, by summing small pieces of it; where its plane is behind, and below the shelf, no light."""
+    slab = block((0.4, 0.3, 0.004))
+    case = moved(block((0.42, 0.32, 0.03)), (0.0, 0.0, -0.0302))
+    shelf = moved(block((0.02, 0.3, 0.2)), (0.15, 0.0, 0.02))
+    glowing = replace(plain((0.8, 0.8, 0.8)), emission=5.0)
+    at = Transform((0.0, 0.0, 0.4), (70.0, 25.0, 40.0), ONE)
+    screen = Drawable(joined(slab, case), at, (glowing, plain()), 1, specular=0.0)
+    floor = lambertian(grid(8.0))
+    frame = draw(renderer, view(floor, screen))
+    rotation, place = screen.pose(0.0)
+    u, v = np.meshgrid((np.arange(40) + 0.5) / 40 - 0.5, (np.arange(30) + 0.5) / 30 - 0.5)
+    pieces = np.stack([0.4 * u, 0.3 * v, np.full_like(u, 0.004)], -1).reshape(-1, 3) @ rotation.T + place
+    points, ahead = floor_points(FROM_ABOVE), rotation[:, 2]
+    to = pieces - points[:, :, None]
+    d2 = (to**2).sum(-1)
+    share = np.maximum(to[..., 2], 0) * np.maximum(-to @ ahead, 0) / d2**2
+    expected = 0.5 / np.pi * 4.0 * share.sum(-1) * (0.4 * 0.3 / len(pieces))
+    seen, height = maximum_filter(frame.object_id, 3) == 0, (points - place) @ ahead
+    bright = seen & (height > 0.1) & (expected > 0.1 * expected[seen].max())
+    assert bright.mean() > 0.2
+    np.testing.assert_allclose(frame.radiance[bright, 0], expected[bright], rtol=0.03)
+    dark = seen & (height < -0.02)
+    assert dark.mean() > 0.2
+    assert frame.radiance[dark].max() < 1e-3 * frame.radiance[bright].max()
+    with_shelf = Drawable(joined(slab, case, shelf), at, (glowing, plain(), plain()), 1, specular=0.0)
+    shaded = draw(renderer, view(floor, with_shelf)).radiance[..., 0]
+    assert (shaded[bright] < 0.5 * frame.radiance[bright, 0]).mean() > 0.1
+
+
+def test_what_shines_to_both_sides_is_no_display(renderer: Renderer) -> None:
+    """A slab with nothing behind it, and one between two cases."""
+    slab, case = block((0.4, 0.3, 0.004)), block((0.42, 0.32, 0.01))
+    glowing = replace(plain(), emission=5.0)
+    behind, before = moved(case, (0.0, 0.0, -0.011)), moved(case, (0.0, 0.0, 0.005))
+    for count, parts in ((0, [slab]), (1, [slab, behind]), (1, [slab, before]), (0, [slab, behind, before])):
+        materials = (glowing, plain(), plain())[: len(parts)]
+        pieces = hoods_apart([Drawable(joined(*parts), STILL, materials, 1)])
+        assert sum(len(piece.displays) for piece in pieces) == count
 
 
 def test_a_grey_sky_is_a_furnace(renderer: Renderer) -> None:

@@ -5,8 +5,8 @@ The background and the shining faces of area lights are drawables like any other
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -44,11 +44,22 @@ CLEAR = 0.5
 """Transmission from which a material is drawn as glass, behind which the rest of the scene is seen."""
 
 
+@dataclass(frozen=True, eq=False)
+class Display:
+    """A rectangle that shines, metres, before its object is turned and moved: centre, half width and half
+    height (3,), whose cross product points away from its light."""
+
+    centre: np.ndarray
+    half_width: np.ndarray
+    half_height: np.ndarray
+
+
 @dataclass(frozen=True)
 class Drawable:
     """materials: one per part of the mesh. specular: reflectance of its dielectric parts, 0..1.
 
-    glow: radiance of the front whatever the material. casts: whether it shades anything.
+    glow: radiance of the front whatever the material. casts: whether it shades anything. displays: number of
+    a part that shines as a rectangle -> that rectangle, as `fsid.render.lamps` finds them.
     """
 
     mesh: Mesh
@@ -59,6 +70,7 @@ class Drawable:
     motion: Motion = UNMOVED
     glow: Vec3 = ZERO
     casts: bool = True
+    displays: Mapping[int, Display] = field(default_factory=dict)
 
     def pose(self, time_s: float) -> tuple[np.ndarray, np.ndarray]:
         """Rotation (3, 3) and position (3,) at a time: x_world = rotation (x * scale) + position."""

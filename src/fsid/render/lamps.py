@@ -3,7 +3,8 @@
     I = L A / 4      mean radiant intensity of a convex body of surface A and radiance L
 
 placed at its centroid, as large as a sphere of that surface, and shaded by everything but itself and what
-it touches.
+it touches. A flat one with something behind it, as the display of a screen, becomes an area light in its
+place, which shines to the front alone and is shaded by the rest of its own object, too.
 """
 
 from __future__ import annotations
@@ -15,12 +16,19 @@ import numpy as np
 from trimesh.triangles import closest_point
 
 from fsid.assets import Mesh
-from fsid.render.drawable import BACKGROUND_ID, CLEAR, Drawable
-from fsid.render.shadows import Source
+from fsid.render.drawable import BACKGROUND_ID, CLEAR, Display, Drawable
+from fsid.render.shadows import Source, unit
 from fsid.scene.model import Light, Material
+from fsid.scene.vectors import vec3
 
 MAX_LAMPS = 12
-"""The strongest ones; each costs as much as a point light."""
+"""The strongest ones; each costs as much as a point or area light."""
+
+_FLAT = 0.8
+"""Share of a surface that faces one way, to and fro, from which on it is flat."""
+
+_BEHIND = 0.3
+"""How far behind a display its back is looked for, relative to the edge of a square of its size."""
 
 
 def lamps_of(
@@ -34,45 +42,131 @@ def lamps_of(
         for part, material in enumerate(drawable.materials):
             if material.emission <= 0 or part not in drawable.mesh.face_parts:
                 continue
-            centroid, area = _extent(drawable, part)
-            rotation, position = drawable.pose(time_s)
-            intensity = material.emission * albedo_of(material) * area / 4
-            r, g, b = (float(c) for c in intensity)
-            x, y, z = (float(c) for c in rotation @ centroid + position)
-            radius = float(np.sqrt(area / (4 * np.pi)))
-            light = Light("point", (x, y, z), (0.0, 0.0, -1.0), (r, g, b), radius, 360.0)
-            found.append((r + g + b, Source(light, number)))
+            radiance, pose = material.emission * albedo_of(material), drawable.pose(time_s)
+            if part in drawable.displays:
+                source = _panel(drawable.displays[part], radiance, pose, number)
+            else:
+                source = _ball(*_extent(drawable, part), radiance, pose, number)
+            ahead = np.prod(source.light.size_m) if source.light.kind == "area" else 1.0
+            found.append((sum(source.light.colour) * float(ahead), source))
     found.sort(key=lambda pair: -pair[0])
     return [source for _, source in found[:MAX_LAMPS]]
 
 
+_Pose = tuple[np.ndarray, np.ndarray]
+
+
+def _ball(centroid: np.ndarray, area: float, radiance: np.ndarray, pose: _Pose, number: int) -> Source:
+    rotation, position = pose
+    radius = float(np.sqrt(area / (4 * np.pi)))
+    place, intensity = vec3(rotation @ centroid + position), vec3(radiance * area / 4)
+    return Source(Light("point", place, (0.0, 0.0, -1.0), intensity, radius, 360.0), number)
+
+
+def _panel(display: Display, radiance: np.ndarray, pose: _Pose, number: int) -> Source:
+    rotation, position = pose
+    axes = (rotation @ display.half_width, rotation @ display.half_height)
+    width, height = (2 * float(np.linalg.norm(axis)) for axis in axes)
+    place, ahead = vec3(rotation @ display.centre + position), vec3(unit(np.cross(axes[1], axes[0])))
+    light = Light("area", place, ahead, vec3(radiance), 0.0, 180.0, (width, height))
+    return Source(light, number, axes)
+
+
 def hoods_apart(drawables: Sequence[Drawable]) -> tuple[Drawable, ...]:
-    """The same, with the hoods of lamps as drawables of their own: what shades their light."""
+    """The same with displays found, and hoods of lamps as drawables of their own: what shades their light."""
     return tuple(piece for drawable in drawables for piece in _hood_apart(drawable))
 
 
 def _hood_apart(drawable: Drawable) -> list[Drawable]:
     """The parts of a lamp that its light passes through or that touch what shines, and the others."""
     parts = np.unique(drawable.mesh.face_parts)
-    lamps = [_extent(drawable, part) for part in parts if drawable.materials[part].emission > 0]
+    lamps = [part for part in parts if drawable.materials[part].emission > 0]
     if not lamps or drawable.object_id == BACKGROUND_ID:
         return [drawable]
+    found = {int(part): _display(drawable, part) for part in lamps}
+    displays = {part: display for part, display in found.items() if display is not None}
+    balls = [_extent(drawable, part) for part in lamps if part not in displays]
     hood = np.zeros(len(drawable.materials), bool)
-    hood[parts] = [_is_hood(drawable, part, lamps) for part in parts]
-    return [_pieces(drawable, ~hood), _pieces(drawable, hood)] if hood.any() else [drawable]
+    hood[parts] = [_is_hood(drawable, part, balls) for part in parts]
+    shining = replace(_pieces(drawable, ~hood), displays=_renumbered(displays, ~hood))
+    return [shining, _pieces(drawable, hood)] if hood.any() else [replace(drawable, displays=displays)]
 
 
-def _is_hood(drawable: Drawable, part: int, lamps: Sequence[tuple[np.ndarray, float]]) -> bool:
+def _renumbered(displays: dict[int, Display], wanted: np.ndarray) -> dict[int, Display]:
+    """The same by the numbers that their parts have in `_pieces`."""
+    number = np.cumsum(wanted) - 1
+    return {int(number[part]): display for part, display in displays.items()}
+
+
+def _is_hood(drawable: Drawable, part: int, balls: Sequence[tuple[np.ndarray, float]]) -> bool:
     """Whether a part keeps off the spheres of all lamps, as of `_extent`, and lets no light through."""
-    material = drawable.materials[part]
-    if material.emission > 0 or material.translucency > 0 or material.transmission >= CLEAR:
+    if not _is_opaque(drawable.materials[part]):
         return False
     triangles = _triangles(drawable, part)
     return all(
         np.linalg.norm(closest_point(triangles, np.tile(centre, (len(triangles), 1))) - centre, axis=1).min()
         > np.sqrt(area / (4 * np.pi))
-        for centre, area in lamps
+        for centre, area in balls
     )
+
+
+def _is_opaque(material: Material) -> bool:
+    return material.emission <= 0 and material.translucency <= 0 and material.transmission < CLEAR
+
+
+def _display(drawable: Drawable, part: int) -> Display | None:
+    """The rectangle of a part that is flat and has a back close behind it and nothing before it."""
+    triangles = _triangles(drawable, part)
+    doubled = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    areas = np.linalg.norm(doubled, axis=1) / 2
+    normals = doubled / np.maximum(2 * areas, 1e-18)[:, None]
+    shares, axes = np.linalg.eigh((normals * areas[:, None]).T @ normals)
+    if shares[2] < _FLAT * max(areas.sum(), 1e-12):
+        return None
+    others = [p for p in np.unique(drawable.mesh.face_parts) if _is_opaque(drawable.materials[p])]
+    solid = np.concatenate([np.empty((0, 3, 3)), *(_triangles(drawable, p) for p in others)])
+    for ahead in (axes[:, 2], -axes[:, 2]):
+        front = normals @ ahead > 0.5 * np.sqrt(_FLAT)
+        if not front.any():
+            continue
+        display = _rectangle(triangles[front], areas[front], ahead)
+        if _covered(display, -ahead, solid) and not _covered(display, ahead, solid):
+            return display
+    return None
+
+
+def _rectangle(triangles: np.ndarray, areas: np.ndarray, ahead: np.ndarray) -> Display:
+    """As large as the triangles (F, 3, 3), as wide and high as these are along the axes of their object."""
+    aside = np.eye(3)[int(np.argmin(np.abs(ahead[:2])))]
+    width = unit(aside - (aside @ ahead) * ahead)
+    height = np.cross(ahead, width)
+    edges = [float(np.ptp(triangles @ axis)) for axis in (width, height)]
+    filled = np.sqrt(areas.sum() / max(edges[0] * edges[1], 1e-12))
+    centre = np.average(triangles.mean(1), axis=0, weights=areas)
+    half_width, half_height = (
+        axis * edge * filled / 2 for axis, edge in zip((width, height), edges, strict=True)
+    )
+    return Display(centre, half_width, -half_height)
+
+
+def _covered(display: Display, direction: np.ndarray, triangles: np.ndarray) -> bool:
+    """Whether most of a display has one of the triangles (F, 3, 3) close to it in a direction."""
+    w, h = display.half_width, display.half_height
+    reach = _BEHIND * 2 * np.sqrt(np.linalg.norm(w) * np.linalg.norm(h))
+    places = display.centre + np.array([0 * w, w + h, w - h, h - w, -w - h]) / 2
+    return sum(_meets(place, direction * reach, triangles) for place in places) >= 3
+
+
+def _meets(start: np.ndarray, step: np.ndarray, triangles: np.ndarray) -> bool:
+    """Whether the way from `start` to `start + step` crosses a triangle (Moeller and Trumbore 1997)."""
+    a, b, c = (triangles[:, i] for i in range(3))
+    across = np.cross(step, c - a)
+    volume = ((b - a) * across).sum(1)
+    scale = np.where(np.abs(volume) > 1e-18, volume, np.inf)
+    u = ((start - a) * across).sum(1) / scale
+    turned = np.cross(start - a, b - a)
+    v, t = turned @ step / scale, ((c - a) * turned).sum(1) / scale
+    return bool(((u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0) & (t <= 1) & np.isfinite(scale)).any())
 
 
 def _pieces(drawable: Drawable, wanted: np.ndarray) -> Drawable:

@@ -67,12 +67,16 @@ LIGHT = np.dtype(
 `_fill_nearer`."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Source:
-    """A light, and the number of the drawable (-1: none) that is the lamp itself and casts no shadow."""
+    """A light, and the number of the drawable (-1: none) that is the lamp itself and casts no shadow.
+
+    axes: half width and half height (3,) of an area light that does not lie as `half_axes` has it.
+    """
 
     light: Light
     lamp: int = -1
+    axes: tuple[np.ndarray, np.ndarray] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +162,7 @@ def plan_shadows(
         else:
             first, cell = cell, cell + len(field)
         own = [_tile(f, first + i, tile_px, source.lamp) for i, f in enumerate(field)]
-        _fill(row, source.light, field, first, own)
+        _fill(row, source, field, first, own)
         tiles += own
     size = (_side_px(columns, tile_px), _side_px(rows, tile_px))
     return ShadowPlan(tiles, size, tile_px, len(sources), table)
@@ -248,8 +252,9 @@ def _axes_along(forward: np.ndarray) -> np.ndarray:
 
 
 def _fill(
-    row: np.void, light: Light, fields: Sequence[_Field], first_tile: int, tiles: Sequence[Tile]
+    row: np.void, source: Source, fields: Sequence[_Field], first_tile: int, tiles: Sequence[Tile]
 ) -> None:
+    light = source.light
     row["position"] = tiles[0].origin
     row["radius_m"], row["colour"] = light.radius_m, light.colour
     row["direction"] = unit(np.array(light.direction))
@@ -258,7 +263,7 @@ def _fill(
     row["focal"], row["border"], row["range_m"] = tiles[0].focal, fields[0].border, tiles[0].range_m
     row["kind"], row["first_tile"], row["tile_count"] = KINDS[light.kind], first_tile, len(tiles)
     if light.kind == "area":
-        row["half_width"][:3], row["half_height"][:3] = half_axes(light)
+        row["half_width"][:3], row["half_height"][:3] = source.axes or half_axes(light)
         row["radius_m"] = 0.5 * float(np.hypot(*light.size_m))
     if len(fields) == 2:
         _fill_nearer(row, *fields)

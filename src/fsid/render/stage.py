@@ -13,7 +13,7 @@ from fsid.render.geometry import Geometry, merge
 from fsid.render.lamps import lamps_of
 from fsid.render.layers import Layer
 from fsid.render.room import Room, light_room, light_sky
-from fsid.render.shadows import ShadowPlan, Source, plan_shadows
+from fsid.render.shadows import KINDS, ShadowPlan, Source, plan_shadows
 from fsid.render.sky import panorama
 from fsid.scene.model import Camera, Material
 
@@ -44,8 +44,8 @@ class Stage:
 
     @property
     def has_areas(self) -> bool:
-        """Whether there are area lights."""
-        return any(light.kind == "area" for light in self.view.lights)
+        """Whether there are area lights, displays that shine included."""
+        return bool((self.plan.table["kind"][: self.plan.light_count] == KINDS["area"]).any())
 
 
 def stage_of(view: View, layers: Mapping[tuple[str, int], Layer], time_s: float, shadow_px: int) -> Stage:
