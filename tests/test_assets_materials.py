@@ -251,6 +251,22 @@ def test_noise_has_the_spectrum_it_promises():
     assert field.std() == pytest.approx(1, abs=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("slope", "low", "high", "stretch"),
+    [(1.6, 1, np.inf, (1, 1)), (0.8, 8, 30, (1, 1)), (1.6, 3, np.inf, (4, 1)), (2.2, 1, 6, (1, 1))],
+)
+def test_noise_is_the_same_at_every_size_and_so_is_what_is_drawn_after_it(slope, low, high, stretch):
+    rngs = [np.random.default_rng(8) for _ in range(3)]
+    small, middle, large = (
+        noise(rng, size, slope, low, high, stretch) for rng, size in zip(rngs, (128, 256, 1024), strict=True)
+    )
+    for finer in (middle, large):
+        k = len(finer) // 128
+        seen = finer.reshape(128, k, 128, k).mean((1, 3))
+        assert np.corrcoef(small.ravel(), seen.ravel())[0, 1] > 0.93
+    assert len({rng.random() for rng in rngs}) == 1
+
+
 def test_level_makes_gaussian_noise_uniform():
     values = level(noise(np.random.default_rng(1), 512, 0.0))
     counts, _ = np.histogram(values, bins=10, range=(0, 1))

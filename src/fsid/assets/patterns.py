@@ -5,9 +5,10 @@
     warp      periodic look-up at displaced coordinates
     ink       lines, shapes and glyphs drawn with PIL, with anti-aliasing, wrapped at the borders
 
-Frequencies and lengths are in cycles or fractions of a tile, so a family looks alike at every size; edges
-are as sharp as the texel allows and grain ends at three texels: fine texture is what a denoiser must learn
-to keep, noise of single texels what it must learn to remove.
+Frequencies and lengths are in cycles or fractions of a tile, and no number of random draws depends on the
+size, so a pattern is the same at every size, seen sharper or less sharp. Edges are as sharp as the texel
+allows, and grain is some texels wide and ends at three: fine texture is what a denoiser must learn to keep,
+noise of single texels what it must learn to remove.
 """
 
 from __future__ import annotations
@@ -16,9 +17,11 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 from PIL import Image, ImageDraw
-from scipy.fft import irfft2
+from scipy.fft import ifft, irfft
 from scipy.ndimage import map_coordinates
 from scipy.special import ndtr
+
+from fsid.assets.streams import branch
 
 Draw = Callable[[ImageDraw.ImageDraw, float, float], None]
 
@@ -42,11 +45,18 @@ def noise(
     low, high: cycles per tile, soft edges; high is at most S / 3, because noise of single texels looks like a
     sensor's. stretch: how many times longer the features are along u and v; across them such a field is cut
     off there, too, and proportionally earlier along them.
+
+    A larger tile has the waves of a smaller one and adds its own; its field is the same seen sharper. `rng`
+    gives one number whatever the size, so that what is drawn after it is the same, too.
     """
     high = min(high, size / 3)
-    white = rng.standard_normal((size, size // 2 + 1, 2), dtype=np.float32).view(np.complex64)[..., 0]
-    fx = np.arange(size // 2 + 1, dtype=np.float32)[None] * np.float32(stretch[0])
-    fy = (np.fft.fftfreq(size, 1 / size).astype(np.float32) * np.float32(stretch[1]))[:, None]
+    rows = 32
+    while rows < min(size, 4 * high):
+        rows *= 2
+    columns = rows // 2
+    white = _waves_rand(branch(rng), rows)
+    fx = np.arange(columns, dtype=np.float32)[None] * np.float32(stretch[0])
+    fy = (np.fft.fftfreq(rows, 1 / rows).astype(np.float32) * np.float32(stretch[1]))[:, None]
     f2 = fx * fx + fy * fy
     f2[0, 0] = 1.0
     gain = f2 ** np.float32(-slope / 2)
@@ -55,8 +65,37 @@ def noise(
     gain *= np.exp(-np.minimum((f2 / (high * high)) ** 2, 80))
     gain[0, 0] = 0.0
     gain[:, 0] *= np.float32(np.sqrt(2))  # the inverse keeps but the symmetric half of this column
-    field = irfft2(white * gain, s=(size, size))
+    white *= gain
+    turns = np.exp(np.fft.fftfreq(rows, size / rows) * 1j * np.pi).astype(np.complex64)
+    white *= turns[:, None]  # to the centres of texels, which are others at another size
+    white *= turns[:columns]
+    if rows < size:
+        white = np.insert(white, columns, np.zeros((size - rows, 1), np.complex64), axis=0)
+    field = irfft(ifft(white, axis=0, overwrite_x=True), n=size, axis=1)
     return field / (field.std() + np.float32(1e-12))
+
+
+def _waves_rand(rng: np.random.Generator, rows: int) -> np.ndarray:
+    """(B, B / 2) complex64 white noise at the frequencies -B / 2 .. B / 2 - 1 (rows, in an FFT's order) by
+    0 .. B / 2 - 1.
+
+    Drawn from low to high in blocks that double, each around those before it: a larger B adds waves and
+    leaves the others as they are.
+    """
+    white = np.empty((rows, rows // 2), np.complex64)
+    half = 16
+    white[:half, :half], white[-half:, :half] = _normals(rng, 2, half, half)
+    while 2 * half < rows:
+        wide = 2 * half
+        white[:wide, half:wide], white[-wide:, half:wide] = _normals(rng, 2, wide, half)
+        white[half:wide, :half], white[-wide:-half, :half] = _normals(rng, 2, half, half)
+        half = wide
+    return white
+
+
+def _normals(rng: np.random.Generator, *shape: int) -> np.ndarray:
+    """Complex64, real and imaginary part standard normal."""
+    return rng.standard_normal((*shape, 2), dtype=np.float32).view(np.complex64)[..., 0]
 
 
 def level(field: np.ndarray, softness: float = 1.0) -> np.ndarray:
