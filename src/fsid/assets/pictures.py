@@ -18,14 +18,21 @@ from PIL import Image, ImageDraw
 from scipy.ndimage import gaussian_filter
 
 from fsid.assets.patterns import noise
+from fsid.assets.streams import branch
 
 KINDS = ("landscape", "still life", "blossoms", "streets", "abstract")
 
 
 def picture_rand(rng: np.random.Generator, height: int, width: int, kind: str | None = None) -> np.ndarray:
-    """(height, width, 3) float32 sRGB-encoded picture of a kind of KINDS, or of any."""
+    """(height, width, 3) float32 sRGB-encoded picture of a kind of KINDS, or of any.
+
+    The same at every size; one below 64 pixels is the mean of a larger one.
+    """
+    rng = branch(rng)
     chosen = kind or str(rng.choice(KINDS))
-    size = 1 << (max(height, width, 64) - 1).bit_length()
+    longer = max(height, width)
+    fine = 1 << max((63 // longer).bit_length(), 0)
+    size = 1 << (fine * longer - 1).bit_length()
     make = {
         "landscape": _landscape,
         "still life": _still_life,
@@ -33,8 +40,9 @@ def picture_rand(rng: np.random.Generator, height: int, width: int, kind: str | 
         "streets": _streets,
         "abstract": _abstract,
     }[chosen]
-    image = make(rng, height, width, noise(rng, size, 1.6)[:height, :width])
-    return np.clip(image, 0, 1).astype(np.float32)
+    high, wide = fine * height, fine * width
+    image = np.clip(make(rng, high, wide, noise(rng, size, 1.6)[:high, :wide]), 0, 1).astype(np.float32)
+    return image.reshape(height, fine, width, fine, 3).mean((1, 3)) if fine > 1 else image
 
 
 def hue_rand(rng: np.random.Generator, saturation: float, value: float) -> np.ndarray:
@@ -150,10 +158,12 @@ def _streets(rng: np.random.Generator, height: int, width: int, cloud: np.ndarra
             shade = (0.3 + 0.2 * layer if night else 0.95 - 0.2 * layer) * hue_rand(rng, 0.15, 0.5)
             r, g, b = (int(c) for c in shade * 255)
             draw.rectangle((left, roof, left + wide, height), fill=(r, g, b))
-            pitch = max(wide / rng.integers(3, 8), 3)
-            for wy in np.arange(roof + pitch / 2, height, pitch):
-                for wx in np.arange(left + pitch / 3, left + wide - pitch / 2, pitch):
-                    on = rng.random() < 0.45
+            pitch = max(wide / rng.integers(3, 8), 0.012 * width)
+            rows = np.arange(roof + pitch / 2, height, pitch)
+            lights = branch(rng).random((len(rows), 8)) < 0.45
+            for wy, lit in zip(rows, lights, strict=True):
+                columns = np.arange(left + pitch / 3, left + wide - pitch / 2, pitch)
+                for wx, on in zip(columns, lit, strict=False):
                     tone = (255, 220, 130) if night and on else (r // 2, g // 2, b // 2 + 20)
                     draw.rectangle((wx, wy, wx + pitch * 0.5, wy + pitch * 0.6), fill=tone)
             left += wide

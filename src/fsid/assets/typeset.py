@@ -1,17 +1,23 @@
 """Text and simple figures for printed surfaces: fonts of matplotlib, words of random letters in many scripts.
 
+Lines break where the outlines of their letters end, not the pixels, and every line has random numbers of its
+own: a sheet says the same at every size.
+
 Nothing is written that means anything; letter frequencies are roughly those of the languages. The basic
 layout engine is asked for, because the other one is not there on every machine and would set other texels.
 """
 
 from __future__ import annotations
 
-from functools import lru_cache
+from dataclasses import dataclass
+from functools import cache, lru_cache
 from pathlib import Path
 
 import matplotlib
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
+
+from fsid.assets.streams import branch
 
 _WIDE_FONTS = ("DejaVuSans", "DejaVuSans-Bold", "DejaVuSans-Oblique", "DejaVuSansMono")
 _EUROPEAN_FONTS = (*_WIDE_FONTS, "DejaVuSerif", "DejaVuSerif-Italic", "DejaVuSerif-Bold", "STIXGeneral")
@@ -31,19 +37,51 @@ SCRIPTS: dict[str, tuple[str, tuple[str, ...]]] = {
 }
 """Name -> (letters, as often as they come; fonts that have them)."""
 
+_ENDS = ("", "", "", "", "", "", ",", ".", ";", ":")
 _SHARES = (0.42, 0.09, 0.08, 0.13, 0.05, 0.05, 0.06, 0.04, 0.02, 0.04, 0.02)
 
 
-@lru_cache(maxsize=512)
-def font(name: str, points: int) -> ImageFont.FreeTypeFont:
+@dataclass(frozen=True)
+class Face:
     """A font of matplotlib by its file's name; points: its size in pixels."""
+
+    name: str
+    points: float
+
+    def length(self, text: str) -> float:
+        """Of a line, in pixels."""
+        return self.points * sum(_advance(self.name, letter) for letter in text)
+
+    def write(
+        self,
+        draw: ImageDraw.ImageDraw,
+        at: tuple[float, float],
+        text: str,
+        fill: int | tuple[int, int, int],
+    ) -> None:
+        """Word by word: letters of small fonts are whole pixels wide, and a line of them would run away."""
+        face = _font(self.name, max(round(4 * self.points) / 4, 2.0))
+        x, y = at
+        for word in text.split(" "):
+            draw.text((x, y), word, font=face, fill=fill)
+            x += self.length(word + " ")
+
+
+@lru_cache(maxsize=512)
+def _font(name: str, points: float) -> ImageFont.FreeTypeFont:
     path = Path(matplotlib.get_data_path()) / "fonts" / "ttf" / f"{name}.ttf"
-    return ImageFont.truetype(str(path), max(points, 6), layout_engine=ImageFont.Layout.BASIC)
+    return ImageFont.truetype(str(path), points, layout_engine=ImageFont.Layout.BASIC)
 
 
-def font_rand(rng: np.random.Generator, script: str, points: int) -> ImageFont.FreeTypeFont:
+@cache
+def _advance(name: str, letter: str) -> float:
+    """Of a letter in a font of one pixel."""
+    return _font(name, 256.0).getlength(letter) / 256
+
+
+def font_rand(rng: np.random.Generator, script: str, points: float) -> Face:
     """A font that has the letters of `script`."""
-    return font(str(rng.choice(SCRIPTS[script][1])), points)
+    return Face(str(rng.choice(SCRIPTS[script][1])), points)
 
 
 def script_rand(rng: np.random.Generator) -> str:
@@ -53,19 +91,20 @@ def script_rand(rng: np.random.Generator) -> str:
 
 def words_rand(rng: np.random.Generator, script: str, count: int) -> str:
     """`count` words of random letters, some with capitals and punctuation."""
-    letters = list(SCRIPTS[script][0])
-    words = ["".join(rng.choice(letters, rng.integers(1, 11))) for _ in range(count)]
-    ends = rng.choice(["", "", "", "", "", "", ",", ".", ";", ":"], count)
-    shown = [w.capitalize() if rng.random() < 0.15 else w for w in words]
-    return " ".join(word + end for word, end in zip(shown, ends, strict=True))
+    return " ".join(_word_rand(rng, SCRIPTS[script][0]) for _ in range(count))
 
 
-def fitted(text: str, face: ImageFont.FreeTypeFont, width: float) -> str:
+def _word_rand(rng: np.random.Generator, letters: str) -> str:
+    word = "".join(letters[k] for k in rng.integers(0, len(letters), rng.integers(1, 11)))
+    return (word.capitalize() if rng.random() < 0.15 else word) + _ENDS[int(rng.integers(len(_ENDS)))]
+
+
+def fitted(text: str, face: Face, width: float) -> str:
     """As much of the beginning of `text` as is `width` pixels wide."""
     if width <= 0:
         return ""
-    while face.getlength(text) > width:
-        text = text[: min(len(text) - 1, int(len(text) * width / face.getlength(text)))]
+    while (length := face.length(text)) > width:
+        text = text[: min(len(text) - 1, int(len(text) * width / length))]
     return text
 
 
@@ -73,23 +112,29 @@ def paragraph(
     rng: np.random.Generator,
     draw: ImageDraw.ImageDraw,
     box: tuple[float, float, float, float],
-    points: int,
+    points: float,
     fill: int | tuple[int, int, int],
     script: str,
 ) -> float:
     """Fill a box (left, top, right, bottom) with lines of one font, ragged right; returns the end's y.
 
-    points: size of the font in pixels, at least 6.
+    points: size of the font in pixels.
     """
     left, y, right, bottom = box
-    points = max(points, 6)
-    face = font_rand(rng, script, points)
+    lines = branch(rng)
+    face = font_rand(lines, script, points)
     while y + points * 1.3 <= bottom:
-        text = words_rand(rng, script, int((right - left) / points / 2.4) + 2)
-        last = rng.random() < 0.12
-        draw.text((left, y), fitted(text, face, (right - left) * (0.5 if last else 1)), font=face, fill=fill)
+        own = branch(lines)
+        last = own.random() < 0.12
+        text = words_rand(own, script, int((right - left) / points / 2.4) + 2)
+        face.write(draw, (left, y), fitted(text, face, (right - left) * (0.5 if last else 1)), fill)
         y += points * (1.9 if last else 1.3)
     return y
+
+
+def pen(size: int, pixels: float) -> int:
+    """Width of a line on a `canvas`, at least a pixel; pixels: on that of 512 texels."""
+    return max(1, round(pixels * size / 512))
 
 
 def canvas(size: int, colour: int | tuple[int, int, int] = 0) -> tuple[Image.Image, ImageDraw.ImageDraw]:

@@ -13,6 +13,7 @@ from PIL import Image, ImageDraw
 from fsid.assets.material_registry import Layers, material_family, pictured
 from fsid.assets.patterns import axes, cells, edge, noise, warp
 from fsid.assets.pictures import hue_rand, picture_rand
+from fsid.assets.streams import branch
 from fsid.assets.typeset import averaged, canvas, fitted, font_rand, paragraph, script_rand, words_rand
 
 
@@ -23,6 +24,11 @@ def _colour(rgb: np.ndarray) -> tuple[int, int, int]:
 
 def _paste(image: Image.Image, picture: np.ndarray, left: float, top: float) -> None:
     image.paste(Image.fromarray(np.uint8(picture * 255)), (int(left), int(top)))
+
+
+def _doubled(rng: np.random.Generator, high: float, wide: float) -> np.ndarray:
+    """A picture of the texels below so many pixels of a canvas."""
+    return picture_rand(rng, int(high) // 2, int(wide) // 2).repeat(2, 0).repeat(2, 1)
 
 
 def _mirrored(quarter: np.ndarray) -> np.ndarray:
@@ -51,20 +57,19 @@ def magazine(rng: np.random.Generator, variant: int, size: int) -> Layers:
             paper = _colour(0.75 + 0.25 * hue_rand(rng, rng.uniform(0, 0.5), 1.0))
             draw.rectangle((left, top, left + step, top + step), fill=paper)
             ink = _colour(hue_rand(rng, rng.uniform(0, 0.9), rng.uniform(0.05, 0.4)))
-            high = int(step * rng.uniform(0.3, 0.65))
-            wide = int(step * rng.uniform(0.55, 0.94))
+            high, wide = step * rng.uniform(0.3, 0.65), step * rng.uniform(0.55, 0.94)
             x, y = left + rng.uniform(0.03, 0.97) * (step - wide), top + 0.04 * step
-            _paste(image, picture_rand(rng, high // 2, wide // 2).repeat(2, 0).repeat(2, 1), x, y)
+            _paste(image, _doubled(rng, high, wide), x, y)
             script, y = script_rand(rng), y + high + 0.02 * step
-            points = int(step * rng.uniform(0.04, 0.09))
+            points = step * rng.uniform(0.04, 0.09)
             face = font_rand(rng, script, points)
             title = fitted(words_rand(rng, script, 4), face, 0.92 * step)
-            draw.text((left + 0.04 * step, y), title, font=face, fill=ink)
+            face.write(draw, (left + 0.04 * step, y), title, ink)
             columns = int(rng.integers(1, 4))
             for k in range(columns):
                 x = left + (0.04 + 0.92 * k / columns) * step
                 box = (x, y + 1.4 * points, x + 0.86 * step / columns, top + 0.97 * step)
-                paragraph(rng, draw, box, max(int(step * 0.016), 9), ink, script)
+                paragraph(rng, draw, box, max(0.016 * step, 0.018 * size), ink, script)
     return _printed(rng, averaged(image), 0.32)
 
 
@@ -84,21 +89,21 @@ def packaging(rng: np.random.Generator, variant: int, size: int) -> Layers:
                 y, tall = top + rng.uniform(0, 0.9) * step, step * rng.uniform(0.01, 0.12)
                 tone = _colour(accent * rng.uniform(0.5, 1.1))
                 draw.rectangle((left, y, left + step, min(y + tall, top + step)), fill=tone)
-            side = int(step * rng.uniform(0.25, 0.45))
+            side = step * rng.uniform(0.25, 0.45)
             x, y = left + rng.uniform(0.05, 0.5) * step, top + rng.uniform(0.3, 0.5) * step
             if rng.random() < 0.6:
-                _paste(image, picture_rand(rng, side // 2, side).repeat(2, 0)[:side], x, y)
+                _paste(image, picture_rand(rng, int(side) // 2, int(side)).repeat(2, 0), x, y)
             else:
                 draw.ellipse((x, y, x + side, y + side), fill=_colour(hue_rand(rng, 0.9, 0.95)))
-            script, points = script_rand(rng), int(step * rng.uniform(0.1, 0.2))
+            script, points = script_rand(rng), step * rng.uniform(0.1, 0.2)
             light = (250, 248, 240) if ground.mean() < 0.6 else (25, 20, 20)
             for k, share in enumerate((1.0, 0.4)):
-                face = font_rand(rng, script, int(points * share))
+                face = font_rand(rng, script, points * share)
                 text = fitted(words_rand(rng, script, 3), face, 0.9 * step)
                 at = (left + 0.05 * step, top + 0.05 * step + 1.2 * k * points)
-                draw.text(at, text, font=face, fill=light)
+                face.write(draw, at, text, light)
             box = (left + 0.05 * step, top + 0.86 * step, left + 0.95 * step, top + 0.98 * step)
-            paragraph(rng, draw, box, max(int(step * 0.018), 8), light, script)
+            paragraph(rng, draw, box, max(0.018 * step, 0.016 * size), light, script)
     return _printed(rng, averaged(image), (0.25, 0.4, 0.3, 0.5)[variant])
 
 
@@ -141,9 +146,9 @@ def colour_chart(rng: np.random.Generator, variant: int, size: int) -> Layers:
             x, y = i * step + gap, j * step + gap
             draw.rectangle((x, y, x + step - 2 * gap, y + step - 2 * gap), fill=_colour(tone))
             if variant == 2:
-                box = (x + 4, y + step * 0.55, x + step - 3 * gap, y + step - 2 * gap)
+                box = (x + 0.04 * step, y + step * 0.55, x + step - 3 * gap, y + step - 2 * gap)
                 draw.rectangle(box, fill=(240, 240, 238))
-                paragraph(rng, draw, box, int(step * 0.07), (40, 40, 40), "latin")
+                paragraph(rng, draw, box, 0.07 * step, (40, 40, 40), "latin")
     return _printed(rng, averaged(image), 0.7)
 
 
@@ -175,7 +180,7 @@ def comic(rng: np.random.Generator, variant: int, size: int) -> Layers:
             balloon = (box[0] + gap, box[1] + gap, box[0] + 0.6 * across, box[1] + 0.3 * high)
             draw.ellipse(balloon, fill=(250, 250, 250), outline=(10, 10, 10), width=max(1, pen // 2))
             inner = (balloon[0] + 0.1 * across, balloon[1] + 0.06 * high, balloon[2], balloon[3])
-            paragraph(rng, draw, inner, int(wide * 0.014), (10, 10, 10), "latin")
+            paragraph(rng, draw, inner, 0.014 * wide, (10, 10, 10), "latin")
     return _printed(rng, averaged(image), 0.65)
 
 
@@ -199,8 +204,7 @@ def screen(rng: np.random.Generator, variant: int, size: int) -> Layers:
         if kind == 0:
             _program(rng, draw, (x + em, y + 2.3 * em, x + w, y + h), dark, em)
         elif kind == 1:
-            shown = picture_rand(rng, int(h - 2.8 * em) // 2, int(w - em) // 2).repeat(2, 0).repeat(2, 1)
-            _paste(image, shown, x + em / 2, y + 2.3 * em)
+            _paste(image, _doubled(rng, h - 2.8 * em, w - em), x + em / 2, y + 2.3 * em)
         else:
             for _ in range(int(rng.integers(2, 6))):
                 t = np.linspace(x + em, x + w - em, 120)
@@ -220,7 +224,8 @@ def _program(
     em: float,
 ) -> None:
     """Indented lines of words in five colours, as tall as 0.7 to 1.3 em."""
-    points = max(6, int(em * rng.uniform(0.7, 1.3)))
+    rng = branch(rng)
+    points = em * rng.uniform(0.7, 1.3)
     face = font_rand(rng, "latin", points)
     tones = [_colour(hue_rand(rng, 0.6, 0.9 if dark else 0.45)) for _ in range(5)]
     y = box[1]
@@ -228,26 +233,29 @@ def _program(
         x = box[0] + points * 2 * int(rng.integers(0, 5))
         for _ in range(int(rng.integers(0, 7))):
             text = words_rand(rng, "latin", 1) + " "
-            if x + face.getlength(text) > box[2]:
+            if x + face.length(text) > box[2]:
                 break
-            draw.text((x, y), text, font=face, fill=tones[int(rng.integers(5))])
-            x += face.getlength(text)
+            face.write(draw, (x, y), text, tones[int(rng.integers(5))])
+            x += face.length(text)
         y += 1.3 * points
 
 
 @material_family("screen_pixels", tile_m=0.06, relief_m=0.0001, colours="picture")
 def screen_pixels(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """A display from so near that its red, green and blue stripes are seen."""
-    pixels = size // (8, 16, 8, 16)[variant]
+    pixels = (64, 32, 64, 32)[variant]
     picture = _mirrored(picture_rand(rng, pixels // 2, pixels // 2))
     picture = picture.repeat(size // pixels, 0).repeat(size // pixels, 1)
-    u, v = axes(size)
-    x, y = (u * pixels) % 1, (v * pixels) % 1
-    masks = [np.exp(-((((x - c + 0.5) % 1 - 0.5) / 0.14) ** 2)) for c in (1 / 6, 1 / 2, 5 / 6)]
-    rows = edge(np.abs(y - 0.5), 0.4, 0.2)
+    t = axes(max(size, 8 * pixels))[0] * pixels % 1
+
+    def seen(line: np.ndarray) -> np.ndarray:
+        return line.reshape(size, -1).mean(1)
+
+    masks = [seen(np.exp(-((((t - c + 0.5) % 1 - 0.5) / 0.14) ** 2))) for c in (1 / 6, 1 / 2, 5 / 6)]
     if variant >= 2:
-        masks = [np.ones_like(u)] * 3
-    stripes = np.stack([m * (1 - 0.85 * rows) for m in masks], axis=-1)
+        masks = [np.ones(size, np.float32)] * 3
+    rows = seen(1 - 0.85 * edge(np.abs(t - 0.5), 0.4, 0.2))
+    stripes = np.stack(masks, axis=-1)[None] * rows[:, None, None]
     layers = pictured(np.clip(picture * (0.25 + 0.75 * stripes), 0, 1))
     return layers._replace(roughness=0.15, height=0.5)
 

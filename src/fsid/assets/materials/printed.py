@@ -7,7 +7,7 @@ from PIL import ImageDraw
 
 from fsid.assets.material_registry import Layers, material_family
 from fsid.assets.patterns import Draw, axes, edge, ink, level, noise, warp
-from fsid.assets.typeset import averaged, canvas, paragraph, script_rand
+from fsid.assets.typeset import averaged, canvas, paragraph, pen, script_rand
 
 
 def _paper(rng: np.random.Generator, size: int) -> tuple[np.ndarray, np.ndarray]:
@@ -37,14 +37,12 @@ def printed_text(rng: np.random.Generator, variant: int, size: int) -> Layers:
         top = 0.02 * wide
         while top < 0.97 * wide:
             script = script_rand(rng)
-            points = int(
-                wide * rng.choice((0.008, 0.011, 0.014, 0.02, 0.045), p=(0.25, 0.3, 0.25, 0.12, 0.08))
-            )
+            points = wide * rng.choice((0.008, 0.011, 0.014, 0.02, 0.045), p=(0.25, 0.3, 0.25, 0.12, 0.08))
             lines = 1.3 * points * (1 if points > wide * 0.03 else int(rng.integers(2, 9)))
-            bottom = min(top + lines + 1, 0.99 * wide)
+            bottom = min(top + lines + 0.1 * points, 0.99 * wide)
             top = max(paragraph(rng, draw, (left, top, right, bottom), points, 255, script), top + points)
             if rng.random() < 0.15:
-                draw.line((left, top, right, top), fill=255, width=int(rng.integers(1, 6)))
+                draw.line((left, top, right, top), fill=255, width=pen(size, int(rng.integers(1, 6))))
             top += points * rng.uniform(0.2, 1.2)
     return _on_paper(rng, size, averaged(image), 0.75)
 

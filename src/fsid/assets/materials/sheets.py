@@ -5,11 +5,12 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-from PIL import ImageDraw
+from PIL import Image, ImageDraw
 
 from fsid.assets.material_registry import Layers, material_family
 from fsid.assets.patterns import axes, cells, edge, level, noise
-from fsid.assets.typeset import averaged, canvas, fitted, font_rand, paragraph, script_rand, words_rand
+from fsid.assets.streams import branch
+from fsid.assets.typeset import averaged, canvas, fitted, font_rand, paragraph, pen, script_rand, words_rand
 
 Box = tuple[float, float, float, float]
 
@@ -37,18 +38,19 @@ def tables(rng: np.random.Generator, variant: int, size: int) -> Layers:
     for i in range(blocks):
         for j in range(blocks):
             box = (i * step + 0.03 * step, j * step + 0.04 * step, (i + 0.97) * step, (j + 0.96) * step)
-            _table(rng, draw, tint_draw, box, max(int(wide * rng.uniform(0.009, 0.022)), 6))
+            _table(branch(rng), draw, tint_draw, box, wide * rng.uniform(0.009, 0.022))
     return _sheet(rng, size, averaged(image), 0.9 * averaged(tint))
 
 
 def _table(
-    rng: np.random.Generator, draw: ImageDraw.ImageDraw, tint: ImageDraw.ImageDraw, box: Box, points: int
+    rng: np.random.Generator, draw: ImageDraw.ImageDraw, tint: ImageDraw.ImageDraw, box: Box, points: float
 ) -> None:
     left, top, right, bottom = box
     ends = left + (right - left) * np.r_[0, np.cumsum(rng.dirichlet(np.full(rng.integers(3, 9), 4.0)))]
     row_height = points * rng.uniform(1.3, 2.0)
     rows = int((bottom - top) / row_height)
     rule, script = int(rng.integers(1, 4)), script_rand(rng)
+    size = draw.im.size[0] // 2
     face = font_rand(rng, script, points)
     digits = font_rand(rng, "digits", points)
     worded = rng.random(len(ends)) < 0.35
@@ -66,55 +68,59 @@ def _table(
             )
             used = face if row == 0 or worded[k] else digits
             text = fitted(text, used, room)
-            shift = 0.0 if row == 0 or worded[k] else room - used.getlength(text)
-            draw.text((ends[k] + 0.3 * points + shift, y + 0.15 * points), text, font=used, fill=255)
-        draw.line((left, y, right, y), fill=255, width=rule)
+            shift = 0.0 if row == 0 or worded[k] else room - used.length(text)
+            used.write(draw, (ends[k] + 0.3 * points + shift, y + 0.15 * points), text, 255)
+        draw.line((left, y, right, y), fill=255, width=pen(size, rule))
     y = top + rows * row_height
-    draw.rectangle((left, top, right, y), outline=255, width=rule + 1)
+    draw.rectangle((left, top, right, y), outline=255, width=pen(size, rule + 1))
     for x in ends[1:-1]:
-        draw.line((x, top, x, y), fill=180, width=rule)
+        draw.line((x, top, x, y), fill=180, width=pen(size, rule))
 
 
 @material_family("barcodes", tile_m=0.2, relief_m=0.0001, colours="f5f4f0 e3d3b0 141414")
 def barcodes(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """Bar codes, matrix codes and labels of all sizes."""
-    image, draw = canvas(size)
+    image, _ = canvas(size)
     wide, count = 2 * size, (2, 3, 4, 6)[variant]
     step = wide / count
     for i in range(count):
         for j in range(count):
             x, y = (i + 0.08) * step, (j + 0.08) * step
             if rng.random() < 0.6:
-                _bars(rng, draw, (x, y, x + 0.84 * step, y + rng.uniform(0.4, 0.8) * step))
+                _bars(rng, image, (x, y, x + 0.84 * step, y + rng.uniform(0.4, 0.8) * step))
             else:
-                _matrix(rng, draw, (x, y, x + 0.8 * step, y + 0.8 * step))
+                _matrix(rng, image, (x, y, x + 0.8 * step, y + 0.8 * step))
     blank = edge(noise(rng, size, 2.0, low=2, high=8), 0.4, 0.02)
     return _sheet(rng, size, averaged(image), 0.8 * blank)
 
 
-def _bars(rng: np.random.Generator, draw: ImageDraw.ImageDraw, box: Box) -> None:
+def _bars(rng: np.random.Generator, image: Image.Image, box: Box) -> None:
+    """As dark as the bars in a pixel, which may be finer than it."""
     left, top, right, bottom = box
-    unit = max((right - left) / rng.integers(70, 180), 1.0)
-    x = left
+    unit = (right - left) / rng.integers(70, 180)
+    edges = int(left) + np.arange(int(right - left + 3 * unit) + 3)
+    ink, x = np.zeros(len(edges)), left
     while x < right:
-        draw.rectangle((x, top, x + unit * rng.integers(1, 4) - 1, bottom), fill=255)
+        ink += np.clip(edges - x, 0, unit * rng.integers(1, 4))
         x += unit * rng.integers(2, 7)
-    face = font_rand(rng, "digits", int((right - left) / 14))
-    draw.text((left, bottom), "".join(rng.choice(list("0123456789"), 13)), font=face, fill=255)
+    row = np.uint8(255 * np.clip(np.diff(ink), 0, 1))
+    image.paste(Image.fromarray(np.tile(row, (int(bottom - top) + 1, 1))), (int(left), int(top)))
+    face = font_rand(rng, "digits", (right - left) / 14)
+    digits = "".join(rng.choice(list("0123456789"), 13))
+    face.write(ImageDraw.Draw(image), (left, bottom), digits, 255)
 
 
-def _matrix(rng: np.random.Generator, draw: ImageDraw.ImageDraw, box: Box) -> None:
+def _matrix(rng: np.random.Generator, image: Image.Image, box: Box) -> None:
     left, top, right, _ = box
     count = int(rng.choice((21, 25, 29, 33, 41)))
-    unit = (right - left) / count
     on = rng.random((count, count)) < 0.48
     for i, j in ((0, 0), (count - 7, 0), (0, count - 7)):
         on[j : j + 7, i : i + 7] = True
         on[j + 1 : j + 6, i + 1 : i + 6] = False
         on[j + 2 : j + 5, i + 2 : i + 5] = True
-    for j, i in np.argwhere(on):
-        x, y = left + i * unit, top + j * unit
-        draw.rectangle((x, y, x + unit - 0.5, y + unit - 0.5), fill=255)
+    side = round(right - left)
+    code = Image.fromarray(np.uint8(255 * on)).resize((side, side), Image.Resampling.BOX)
+    image.paste(code, (round(left), round(top)))
 
 
 @material_family("resolution_chart", tile_m=0.3, relief_m=0.0001, colours="f4f4f2 9a9a9a 101010")
@@ -151,9 +157,8 @@ def resolution_chart(rng: np.random.Generator, variant: int, size: int) -> Layer
                 r = reach / 2 * 0.85**k
                 c = (x + reach / 2, y + reach / 2)
                 draw.ellipse((c[0] - r, c[1] - r, c[0] + r, c[1] + r), fill=255 * ((k + 1) % 2))
-        draw.text(
-            (x, y + reach), f"{rng.uniform(0.5, 20):.1f}", font=font_rand(rng, "digits", size // 50), fill=255
-        )
+        number = f"{rng.uniform(0.5, 20):.1f}"
+        font_rand(rng, "digits", size / 50).write(draw, (x, y + reach), number, 255)
     u, v = axes(size)
     steps = np.floor(7.999 * np.abs(2 * u - 1)) / 7 * (np.abs(v - 0.5) < 0.04)
     return _sheet(rng, size, averaged(image), steps)
@@ -180,10 +185,14 @@ def handwriting(rng: np.random.Generator, variant: int, size: int) -> Layers:
             up = height * tall * np.sin(t) * 0.5
             points = np.c_[x + step + slant * up + height * loop * 0.5 * np.cos(t), (row + 0.62) * pitch - up]
             if points[:, 0].max() < 0.98 * wide:
-                draw.line(points.ravel().tolist(), fill=255, width=int(max(2, wide / 700)), joint="curve")
+                draw.line(points.ravel().tolist(), fill=255, width=pen(size, 1.6), joint="curve")
             x = float(points[-1, 0]) + height * rng.uniform(0.8, 1.8)
         if rng.random() < 0.15:
-            draw.line((wide * 0.2, (row + 0.5) * pitch, wide * 0.4, (row + 0.55) * pitch), fill=255, width=5)
+            draw.line(
+                (wide * 0.2, (row + 0.5) * pitch, wide * 0.4, (row + 0.55) * pitch),
+                fill=255,
+                width=pen(size, 5),
+            )
     u, v = axes(size)
     ruled = 1 - edge(np.abs((v * lines + 0.2) % 1 - 0.5), lines / size, lines / size)
     squared = 1 - edge(np.abs((u * lines + 0.2) % 1 - 0.5), lines / size, lines / size)
@@ -236,7 +245,7 @@ def street_map(rng: np.random.Generator, variant: int, size: int) -> Layers:
     for _ in range(60):
         x, y = np.minimum(rng.uniform(0, 0.9, 2), (0.87, 0.9)) * 2 * size
         box = (x, y, x + 0.25 * size, y + 0.04 * size)
-        paragraph(rng, draw, box, int(size * rng.uniform(0.015, 0.03)), 255, script_rand(rng))
+        paragraph(rng, draw, box, size * rng.uniform(0.015, 0.03), 255, script_rand(rng))
     water = edge(hill, 1.1, 0.02)
     printed = np.maximum(0.8 * np.maximum(street, 0.6 * lane), averaged(image))
     layers = _sheet(rng, size, np.maximum(printed * (1 - water), 0.35 * water), 0.9 * (value > 0.72))
@@ -270,7 +279,7 @@ def circuit_board(rng: np.random.Generator, variant: int, size: int) -> Layers:
                 draw.rectangle((leg, ends[0], leg + grid * 0.22, ends[1]), fill=255)
         chip_draw.rectangle((x, y, x + w, y + h), fill=255)
         label = (x + grid * 0.2, y + grid * 0.1, x + w - grid * 0.2, y + h)
-        paragraph(rng, chip_draw, label, int(grid * 0.7), 90, "digits")
+        paragraph(rng, chip_draw, label, 0.7 * grid, 90, "digits")
     copper, chip = averaged(tracks), averaged(chips)
     solder = noise(rng, size, 1.2, low=4)
     bare, marked = edge(copper, 0.8, 0.2) * (chip < 0.2), (chip > 0.15) * (chip < 0.6)
