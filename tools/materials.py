@@ -30,7 +30,8 @@ PITCH_M, COLUMNS, CELL_PX = 0.44, 14, 92
 INTRODUCTION = """# Materials
 
 A surface is (family, variant, three colours): `fsid.assets.bake_material("brick", 2)` makes tileable maps at
-any power of two from 64 to 8192 texels, and every use recolours them. A family is one function in
+any power of two from 64 to 8192 texels, and every use recolours them. Every size is the same picture, seen
+more or less sharply; grain alone is some texels wide at all of them. A family is one function in
 `src/fsid/assets/materials/`; adding one touches one file. `src/fsid/scene/pools.py` names those that are
 common on floors, walls or grounds, and those without order. This page is written by
 `python tools/materials.py`.

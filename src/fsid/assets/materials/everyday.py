@@ -36,7 +36,7 @@ def paper(rng: np.random.Generator, variant: int, size: int) -> Layers:
 
 @material_family("cardboard", tile_m=0.4, relief_m=0.0012, colours="c19a6b a67f52 6b4a2c")
 def cardboard(rng: np.random.Generator, variant: int, size: int) -> Layers:
-    """Boxes: flutes shining through, dents, tape and print; open corrugation for 2, edges for 3."""
+    """Boxes: flutes shining through, dents, tape; open corrugation for 2, edges for 3."""
     u, v = axes(size)
     flutes = (60, 60, 40, 24)[variant]
     wave = 0.5 + 0.5 * np.cos(2 * np.pi * flutes * (u + 0 * v))

@@ -122,7 +122,7 @@ def cured_meat(rng: np.random.Generator, variant: int, size: int) -> Layers:
     colours=("e8c25a f0d488 c99a3a", "e6dcb8 d3c598 7a8a9a", "d98a2a e6a552 a8621a", "f2ecd8 e3d9b8 c2b27a"),
 )
 def cheese(rng: np.random.Generator, variant: int, size: int) -> Layers:
-    """Smooth paste with holes, blue veins, grain or rind."""
+    """Smooth paste: with holes for 0 and 3, with blue veins for 1, plain for 2."""
     cloud = noise(rng, size, 2.0)
     near, _, value = cells(rng, size, (5, 12, 9, 7)[variant], 0.85)
     hole = edge(0.34 * value - near, 0, 0.03) * (value > 0.4) * (variant in (0, 3))

@@ -39,7 +39,7 @@ def cobblestones(rng: np.random.Generator, variant: int, size: int) -> Layers:
     colours=("b9a88a 9a8a6e d0c4a8", "8f8a82 6f6a64 b5b0a6", "a8785a 8a5f45 c9bca5", "cfc6b4 b5aa94 8a8272"),
 )
 def ashlar(rng: np.random.Generator, variant: int, size: int) -> Layers:
-    """Hewn blocks of unequal width in courses; rubble for variant 3."""
+    """Hewn blocks of unequal width in courses."""
     rows = (6, 8, 10, 7)[variant]
     u, v = axes(size)
     ragged = noise(rng, size, 1.4, low=6, high=160)
@@ -105,7 +105,7 @@ def sandstone(rng: np.random.Generator, variant: int, size: int) -> Layers:
     colours=("4a5258 5f686e 2f3539", "5a4f58 75686f 3a3238", "3f4a45 566560 7a6a4f", "2a2d30 3d4145 8a8f93"),
 )
 def slate(rng: np.random.Generator, variant: int, size: int) -> Layers:
-    """Split sheets: flat terraces with broken steps, mineral stains; roofing slates for variant 3."""
+    """Split sheets: flat terraces with broken steps, mineral stains."""
     field = noise(rng, size, 1.9, low=1, high=120)
     steps = (5, 8, 12, 4)[variant]
     terrace = np.floor(field * steps / 2)

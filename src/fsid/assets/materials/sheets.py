@@ -166,7 +166,7 @@ def resolution_chart(rng: np.random.Generator, variant: int, size: int) -> Layer
 
 @material_family("handwriting", tile_m=0.25, relief_m=0.0001, colours="f4efdf b9cbe0 1f2a66")
 def handwriting(rng: np.random.Generator, variant: int, size: int) -> Layers:
-    """Cursive loops on ruled, squared or blank paper, with corrections and doodles."""
+    """Cursive loops on ruled, squared or blank paper, with corrections."""
     image, draw = canvas(size)
     wide, lines = 2 * size, (18, 26, 34, 14)[variant]
     pitch = wide / lines

@@ -45,7 +45,7 @@ def sky(rng: np.random.Generator, variant: int, size: int) -> Layers:
 
 @material_family("gradient", tile_m=1.0, relief_m=0.0002)
 def gradient(rng: np.random.Generator, variant: int, size: int) -> Layers:
-    """Nothing but slow transitions: waves, radial spots, soft clouds, folds of light."""
+    """Nothing but slow transitions: waves, soft clouds, folds of light."""
     u, v = axes(size)
     slow, other = (noise(rng, size, 3.0, high=(3, 6, 10, 20)[variant]) for _ in range(2))
     k = int(rng.integers(1, 3))
@@ -152,7 +152,7 @@ def dappled_light(rng: np.random.Generator, variant: int, size: int) -> Layers:
     ),
 )
 def skin(rng: np.random.Generator, variant: int, size: int) -> Layers:
-    """Skin-like: slow blood mottling, fine creases in a net, pores, freckles, a vein. Smooth above all."""
+    """Skin-like: slow blood mottling, fine creases in a net, pores, freckles. Smooth above all."""
     mottle = noise(rng, size, 2.2, low=1, high=40)
     flush = noise(rng, size, 1.6, low=8, high=60)
     shift = 0.35 * np.stack([noise(rng, size, 1.6, low=4, high=120) for _ in range(2)])
