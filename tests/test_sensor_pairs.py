@@ -102,9 +102,9 @@ def test_what_is_no_light_is_refused(light: np.ndarray, words: str):
         clean_from_linear(np.random.default_rng(0), light, load_profile("pixel6"))
 
 
-@pytest.mark.parametrize("exposure", [np.inf, np.array([1.0, np.nan, 1.0], np.float32)])
-def test_an_exposure_without_bounds_is_refused(exposure: np.ndarray | float):
-    """As that of light so weak that its inverse is no number: it would make a RAW of NaN."""
+@pytest.mark.parametrize("exposure", [np.inf, np.array([1.0, np.nan, 1.0], np.float32), -1.0])
+def test_what_is_no_exposure_is_refused(exposure: np.ndarray | float):
+    """As that of light so weak that its inverse is no number, that makes a RAW of NaN; below 0, black."""
     light = np.full((4, 4, 3), 1e-41, np.float32)
     with pytest.raises(FsidError, match="exposure of linear light must be finite"):
         clean_from_linear(np.random.default_rng(0), light, load_profile("pixel6"), exposure)

@@ -381,3 +381,17 @@ def test_each_unit_has_defects_of_its_own_and_keeps_them():
     first, again, other = (np.abs(mosaic - 0.5) > 1e-3 for mosaic in exposures)
     np.testing.assert_array_equal(first, again)
     assert np.mean(first & other) == pytest.approx(0.01, abs=0.003)
+
+
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        ({"exposure_s": -1.0}, "exposure_s -1.0"),
+        ({"exposure_s": np.nan}, "exposure_s nan"),
+        ({"unit": -1}, "unit -1"),
+    ],
+)
+def test_a_time_and_a_unit_are_not_negative(options, named):
+    """Dark current of a time below 0 took away the light that there was."""
+    with pytest.raises(FsidError, match=named):
+        stack(NoiseTerms(dark_current_e_s=30.0), x=0.05, frames=1, **options)

@@ -48,11 +48,12 @@ def clean_from_linear(
     """Linear light (H, W, 3) seen through random colour of `profile`: float Raw in 0..1.
 
     exposure: what takes the light, or each of its three colours, to units of saturation. An odd last row or
-    column is dropped. FsidError for another shape, integers, NaN and infinity in either.
+    column is dropped. FsidError for another shape, integers, NaN and infinity in either, and for an exposure
+    below 0.
     """
     check_linear(linear_srgb)
-    if not np.isfinite(exposure).all():
-        raise FsidError(f"the exposure of linear light must be finite; got {exposure}")
+    if not (np.isfinite(exposure).all() and np.min(exposure) >= 0):
+        raise FsidError(f"the exposure of linear light must be finite and not negative; got {exposure}")
     matrix, gains = colour_rand(rng, profile.xyz_to_camera)
     image = _even(linear_srgb)
     # NumPy takes eight times as long for three numbers per pixel as for a row of them.

@@ -69,10 +69,15 @@ def add_noise_terms(
 ) -> Raw:
     """One exposure of the clean `raw` at `level` with `terms`, neither rounded nor clipped.
 
-    unit: which specimen of the camera; its fixed patterns. exposure_s: for the dark current. FsidError for
-    a level that is none, and counts of electrons with k = 0, which says that they are infinitely many.
+    unit: which specimen of the camera, 0, 1, 2 ...; its fixed patterns. exposure_s: for the dark current.
+    FsidError for one below 0, for a level that is none, and counts of electrons with k = 0, which says that
+    they are infinitely many.
     """
     level.check()
+    if not 0 <= exposure_s < math.inf:
+        raise FsidError(f"exposure_s {exposure_s}: must be finite and not negative")
+    if unit < 0:
+        raise FsidError(f"unit {unit}: must not be negative")
     if terms.poisson and min(level.k) == 0:
         raise FsidError(f"poisson: {level} has a site without shot noise, k = 0; switch the term off")
     shot, pixels, rows, columns, level_drift = rng.spawn(5)
