@@ -311,6 +311,26 @@ def test_black_levels_that_fit_no_pattern_are_one_or_refused(tmp_path, repeat, l
         assert read_raw(tmp_path / "a.dng").black_level == level
 
 
+@pytest.mark.parametrize(
+    ("levels", "level"),
+    [
+        ((50714, "H", 2, (64, 64)), 64),
+        ((50714, "H", 2, (64, 1)), None),
+        ((50714, "2I", 1, (64, 1)), 64),
+        ((50714, "2I", 1, (64, 0)), None),
+        ((50714, "2I", 1, (0, 0)), None),
+    ],
+)
+def test_whole_numbers_are_no_fraction_and_a_fraction_over_0_no_number(tmp_path, levels, level):
+    """Two equal levels, one of them too many, were 64 / 64 = 1, and 0 / 0 was a level of 0."""
+    write_with_black(tmp_path / "a.dng", np.full((32, 40), 70, np.uint16), levels)
+    if level is None:
+        with pytest.raises(FsidError, match=r"a\.dng: its .*BlackLevel .*; correct"):
+            read_raw(tmp_path / "a.dng")
+    else:
+        assert read_raw(tmp_path / "a.dng").black_level == level
+
+
 def test_stored_integers_are_moved_by_whole_dn_and_never_fall_together(tmp_path):
     """Blacks of 60, 64.5, 68 and 75.5 DN about their mean, 67; what is at 0 or white stays there."""
     levels = (50714, "2I", 4, (60, 1, 129, 2, 68, 1, 151, 2))

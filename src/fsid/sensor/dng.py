@@ -217,7 +217,7 @@ def _read_source(file: BinaryIO, path: Path) -> _Source:
     mosaic = _mosaic_directory(directories)
     values: dict[int, Values] = {}
     for directory in (*directories, mosaic):
-        values |= {code: tag.values for code, tag in directory.items()}
+        values |= {code: tag.numbers for code, tag in directory.items()}
     described = mosaic or dng_tags.camera_name(values) != "unknown"
     if path.suffix.lower() in BARE_SUFFIXES and not described:  # LibRaw guesses
         raise FsidError(f"{path}: is a bare mosaic: write it as DNG first, see docs/capture-a-test-set.md")

@@ -33,11 +33,11 @@ from fsid.sensor.tiff import (
     SRATIONAL,
     Tag,
     Values,
-    quotients,
     rationals,
 )
 
 Tags = dict[int, Values]
+"""The numbers of tags, fractions divided out (`Tag.numbers`), by code."""
 
 MAKE, MODEL = 271, 272
 CFA_REPEAT, CFA_PATTERN = 33421, 33422
@@ -68,7 +68,7 @@ def camera_tags(raw: Raw) -> tuple[Tag, ...]:
     that was read from those of several illuminants.
     """
     kept = {tag.code: tag for tag in raw.metadata.first}
-    said = {code: tag.values for code, tag in kept.items()}
+    said = {code: tag.numbers for code, tag in kept.items()}
     read = d65_matrix(said)
     if read is None or not np.array_equal(read, raw.xyz_to_camera):
         kept = {code: tag for code, tag in kept.items() if code not in COLOUR_MATRICES}
@@ -152,7 +152,7 @@ def iso_speed(tags: Tags) -> float:
 
 def exposure_time_s(tags: Tags) -> float:
     """Exposure time in seconds; 0 where `tags` state none."""
-    return next(iter(quotients(_numbers(tags, EXPOSURE_TIME))), 0.0)
+    return float(_number(tags, EXPOSURE_TIME, 0.0))
 
 
 def date_taken(tags: Tags) -> str:
@@ -176,16 +176,16 @@ def black_tile(tags: Tags, path: Path) -> np.ndarray | None:
     """(rows, columns) black levels in DN that repeat from the first pixel of the active area on.
 
     None where `tags` are not a DNG's, or state none. Equal ones are one, however many. FsidError, naming
-    `path`, where others do not fit their pattern.
+    `path`, where others do not fit their pattern, and for a fraction over 0.
     """
-    values = list(_numbers(tags, BLACK_LEVEL))
+    if DNG_VERSION not in tags or BLACK_LEVEL not in tags:
+        return None
+    values = _numbers(tags, BLACK_LEVEL)
+    if not values:
+        raise FsidError(f"{path}: its BlackLevel states no number, or a fraction over 0; correct this tag")
     repeat = _numbers(tags, BLACK_REPEAT) or (1, 1)
     fits = len(repeat) == 2 and all(1 <= n <= MAX_REPEAT for n in repeat)
     rows, columns = map(int, repeat) if fits else (0, 0)
-    if len(values) == 2 * rows * columns:
-        values = quotients(values)
-    if DNG_VERSION not in tags or not values:
-        return None
     if len(values) == rows * columns:
         return np.array(values, np.float64).reshape(rows, columns)
     if len(set(values)) == 1:
@@ -199,7 +199,7 @@ def black_tile(tags: Tags, path: Path) -> np.ndarray | None:
 def black_deltas(tags: Tags, code: int, length: int) -> np.ndarray:
     """(length,) DN that each row (code BLACK_DELTA_V) or column (BLACK_DELTA_H) of the active area adds to
     the black level; 0 where `tags` state another number of them."""
-    deltas = quotients(_numbers(tags, code))
+    deltas = _numbers(tags, code)
     return np.array(deltas) if len(deltas) == length else np.zeros(length)
 
 
@@ -208,8 +208,8 @@ def d65_matrix(tags: Tags) -> np.ndarray | None:
     first = (_number(tags, ILLUMINANT_1, D65), _numbers(tags, COLOUR_MATRIX_1))
     second = (_number(tags, ILLUMINANT_2, 0), _numbers(tags, COLOUR_MATRIX_2))
     for _, numbers in sorted((first, second), key=lambda pair: _mired_from_d65(pair[0])):
-        if len(matrix := quotients(numbers)) == 9:
-            return np.reshape(matrix, (3, 3))
+        if len(numbers) == 9:
+            return np.reshape(numbers, (3, 3))
     return None
 
 

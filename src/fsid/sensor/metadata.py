@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from fsid.sensor.tiff import ASCII, RATIONAL, SHORT, Tag, quotients, rationals
+from fsid.sensor.tiff import ASCII, RATIONAL, SHORT, Tag, rationals
 
 ORIENTATION, EXPOSURE_TIME, F_NUMBER, FOCAL_LENGTH, LENS_MODEL = 274, 33434, 33437, 37386, 42036
 DATE_TAKEN = 36867
@@ -69,10 +69,8 @@ class Metadata:
 
 
 def _numbers(tag: Tag) -> list[float]:
-    """The values of `tag`, rationals divided out; [] of text and of rationals that are no numbers."""
-    if isinstance(tag.values, bytes):
-        return []
-    return quotients(tag.values) if tag.kind == RATIONAL else [float(value) for value in tag.values]
+    """The numbers of `tag`; [] of text and of fractions over 0."""
+    return [] if isinstance(tag.numbers, bytes) else [float(value) for value in tag.numbers]
 
 
 def kept_metadata(directories: Sequence[Mapping[int, Tag]], mosaic: Mapping[int, Tag]) -> Metadata:

@@ -54,6 +54,13 @@ class Tag:
     kind: int
     values: Values
 
+    @property
+    def numbers(self) -> Values:
+        """`values` with fractions divided out: none where one is over 0. Bytes and text as they are."""
+        if self.kind in (RATIONAL, SRATIONAL) and not isinstance(self.values, bytes):
+            return tuple(quotients(self.values))
+        return self.values
+
 
 @dataclass(frozen=True, eq=False)
 class Directory:
