@@ -61,6 +61,8 @@ def export(run: str | Path | None, file: str | Path, precision: Precision | None
         raise FsidError(f"{file}: is the network itself, which would be overwritten; give another name")
     check_output(file)
     denoiser = load_denoiser(path)
+    if suffix == ".onnx" and not denoiser.attention_widths:
+        raise FsidError(f"{path}: has no blocks, without which there is no .onnx; export it as .safetensors")
     measured = probes()
     if suffix == ".onnx":
         return _onnx(denoiser, file, precision or "float32", measured)
