@@ -299,6 +299,20 @@ def test_sixteen_bit_grey_keeps_its_values(name: str, tmp_path: Path) -> None:
     np.testing.assert_allclose(pixels, np.stack([levels / 65535] * 3, axis=-1), atol=1e-6)
 
 
+@pytest.mark.parametrize(("pages", "size"), [("tP", 64), ("ttPt", 64), ("Pt", 64), ("t", 32), ("tt", 0)])
+def test_a_thumbnail_is_not_the_picture(pages: str, size: int, tmp_path: Path) -> None:
+    """A smaller copy (t) may be a TIFF's first page; one alone is the picture that there is."""
+    with tifffile.TiffWriter(tmp_path / "a.tif") as file:
+        for page in pages:
+            side = 64 if page == "P" else 32
+            file.write(np.zeros((side, side, 3), np.uint8), photometric="rgb", subfiletype=page == "t")
+    if size:
+        assert read_photo(tmp_path / "a.tif").shape == (size, size, 3)
+    else:
+        with pytest.raises(FsidError, match=r"a\.tif: .* thumbnails alone"):
+            read_photo(tmp_path / "a.tif")
+
+
 @pytest.mark.parametrize("kind", [np.float32, np.int32, np.int16])
 def test_photographs_of_other_numbers_are_refused(kind: type, tmp_path: Path) -> None:
     tifffile.imwrite(tmp_path / "odd.tif", np.ones((40, 32), kind))

@@ -20,6 +20,9 @@ _WITHOUT_ALPHA = {"P": "RGB", "PA": "RGB", "RGBA": "RGB", "RGBX": "RGB", "LA": "
 PHOTO_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".bmp")
 _FORMATS = ("PNG", "JPEG", "TIFF", "WEBP", "BMP")
 """Whatever a file is called: others Pillow may hand to programs of their own, PostScript to Ghostscript."""
+_SUBFILE, _PHOTOMETRIC, _SUB_PAGES = 254, 262, 330
+_REDUCED, _WHITE_IS_ZERO = (1, 3, 5, 7), 0
+"""Tags of TIFF 6.0, and what the first two may say."""
 
 
 def find_photos(folder: str | Path) -> list[Path]:
@@ -76,6 +79,7 @@ def _read(path: str | Path, shrink: int = 1) -> np.ndarray:
     check_file(Path(path))
     try:
         with Image.open(path, formats=_FORMATS) as image:
+            _pass_thumbnails(image)
             width, height = image.size
             if min(width, height) < SMALLEST_PX:
                 needed = f"at least {SMALLEST_PX}x{SMALLEST_PX} are needed"
@@ -85,6 +89,18 @@ def _read(path: str | Path, shrink: int = 1) -> np.ndarray:
             return _decoded(image)
     except (OSError, SyntaxError, ValueError, struct.error, Image.DecompressionBombError) as error:
         raise FsidError(f"{path}: cannot be read as a photograph ({error})") from None
+
+
+def _pass_thumbnails(image: Image.Image) -> None:
+    """Go on to a TIFF's first page that is no smaller copy of another."""
+    tags = getattr(image, "tag_v2", {})
+    has_more = getattr(image, "is_animated", False) or _SUB_PAGES in tags
+    while has_more and tags.get(_SUBFILE) in _REDUCED:
+        try:
+            image.seek(image.tell() + 1)
+        except EOFError:
+            raise ValueError("its pages are thumbnails alone; save the picture as the first page") from None
+        tags = getattr(image, "tag_v2", {})
 
 
 def _decoded(image: Image.Image) -> np.ndarray:
