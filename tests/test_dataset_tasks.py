@@ -283,7 +283,7 @@ def test_a_photograph_stands_upright_whatever_else_its_exif_says(orientation: in
         np.testing.assert_array_equal(np.rint(read_photo(tmp_path / name) * 255), expected)
 
 
-@pytest.mark.parametrize("name", ["grey.png", "grey.tif", "big-endian.tif", "turned.png"])
+@pytest.mark.parametrize("name", ["grey.png", "grey.tif", "big-endian.tif", "white-is-0.tif", "turned.png"])
 def test_sixteen_bit_grey_keeps_its_values(name: str, tmp_path: Path) -> None:
     levels = np.linspace(0, 65535, 40 * 32).reshape(40, 32).astype(np.uint16)
     if name == "turned.png":
@@ -292,6 +292,8 @@ def test_sixteen_bit_grey_keeps_its_values(name: str, tmp_path: Path) -> None:
         Image.fromarray(levels[::-1, ::-1].copy()).save(tmp_path / name, exif=exif)
     elif name == "big-endian.tif":
         tifffile.imwrite(tmp_path / name, levels, byteorder=">")
+    elif name == "white-is-0.tif":
+        tifffile.imwrite(tmp_path / name, 65535 - levels, photometric="miniswhite")
     else:
         Image.fromarray(levels).save(tmp_path / name)
     pixels = read_photo(tmp_path / name)

@@ -113,6 +113,8 @@ def _values(image: Image.Image) -> np.ndarray:
     """(H, W, 3) float32 0..1, as stored; Pillow's own conversion of 16-bit grey would clip it to white."""
     if image.mode.startswith("I;16") or (image.mode, image.format) == ("I", "PNG"):
         grey = np.asarray(image, np.float32) / np.float32(65535.0)
+        if getattr(image, "tag_v2", {}).get(_PHOTOMETRIC) == _WHITE_IS_ZERO:  # of 8 bits Pillow sees to it
+            grey = 1 - grey
         return grey[..., None].repeat(3, axis=2)
     if image.mode in ("I", "F"):
         raise ValueError("its values are not 8-bit or 16-bit unsigned integers")
