@@ -1,14 +1,18 @@
 """Settings: overlays apply in order, and every mistake is one line that names the key."""
 
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import MISSING, dataclass, field, fields, replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal, get_args, get_type_hints
 
 import numpy as np
 import pytest
 
 from fsid.config import Override, from_plain, given_keys, load_settings, save_settings
+from fsid.dataset import GenerateConfig, Workforce
 from fsid.errors import FsidError
+from fsid.scene import SceneConfig
+from fsid.sensor import NoiseTerms
 
 
 @dataclass(frozen=True)
@@ -35,6 +39,37 @@ def test_later_overlays_win(tmp_path: Path):
     file.write_text("count: 5\ninner: {rate: 2}\n")
     got = load_settings(Outer, file, ["inner.rate=1e-3", "inner.names=[x, y]", "wide=true"])
     assert got == Outer(5, True, (1.0, 2.0), Inner(1e-3, ("x", "y")))
+
+
+def _settings() -> Iterator[Any]:
+    """One of each kind."""
+    yield from (GenerateConfig(), GenerateConfig().checks, Workforce(), NoiseTerms(), SceneConfig())
+    yield from (getattr(SceneConfig(), f.name) for f in fields(SceneConfig) if f.default is MISSING)
+    pytest.importorskip("torch")
+    from fsid.dataset.loader import PatchConfig
+    from fsid.denoise import TrainConfig
+    from fsid.evaluate.demo import DemoConfig
+    from fsid.evaluate.experiments import scale_config
+
+    yield from (TrainConfig(), TrainConfig().network, DemoConfig(), scale_config("ablation", "cpu"))
+    yield PatchConfig(32, 4, ("pixel6",), 400.0, 8000.0)
+
+
+def test_settings_made_in_python_are_of_the_types_they_state():
+    """A text is a list of letters for Python, a fraction a count, and any text true."""
+    wrong = {int: [1.5, True, "1"], bool: ["no", 1], str: [5, ["a"]], float: [True, "a", None]}
+    for settings in _settings():
+        for key, kind in get_type_hints(type(settings)).items():
+            fractions = [(1.5, 3.5)] if get_args(kind)[:1] == (int,) else []
+            for value in (*wrong.get(kind, ["pixel6", None, 5]), *fractions):
+                with pytest.raises(FsidError, match=rf"^{key}: .*"):
+                    replace(settings, **{key: value})
+
+
+def test_settings_made_in_python_are_those_of_a_file():
+    config = GenerateConfig(width=np.int64(64), cameras=["pixel6"], images=Path("a"), iso_range=[400, 800])
+    assert config == GenerateConfig(width=64, cameras=("pixel6",), images="a", iso_range=(400.0, 800.0))
+    assert {type(value) for value in (config.width, *config.iso_range)} == {int, float}
 
 
 def test_on_and_off_may_go_without_quotes():

@@ -420,13 +420,8 @@ def test_settings_made_in_python_are_those_of_a_file(tmp_path: Path):
     assert generate(str(tmp_path / "out"), loose, count=np.int64(1), seed=np.int64(3)) == 1
     assert generate(tmp_path / "out", loose, count=1, seed=3) == 0
     assert generate(tmp_path / "out", replace(config, cameras=("pixel6",)), count=1, seed=3) == 0
-    for wrong, seed, words in (
-        (replace(config, width=64.0), 0, "config: width: 64.0"),
-        (replace(config, cameras="pixel6"), 0, r"config: cameras: 'pixel6' is not a list; write \[pixel6\]"),
-        (config, 1.5, "dataset: seed: 1.5"),
-    ):
-        with pytest.raises(FsidError, match=words):
-            generate(tmp_path / "wrong", wrong, count=1, seed=seed)
+    with pytest.raises(FsidError, match=r"^seed: 1\.5"):
+        generate(tmp_path / "wrong", config, count=1, seed=1.5)
     assert not (tmp_path / "wrong").exists()
 
 

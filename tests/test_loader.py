@@ -508,7 +508,7 @@ def test_numbers_may_be_those_of_numpy(dataset: Path) -> None:
     config = replace(CONFIG, size_px=np.int64(16), batch=np.int64(3), iso_min=np.float64(400))
     patches = PatchDataset(dataset, config, np.int64(0), rank=np.int64(0), world=np.int64(1))
     assert equal(patches[np.int64(5)], PatchDataset(dataset, CONFIG, seed=0)[5])
-    with pytest.raises(FsidError, match=r"config: size_px: 16\.0 is not a whole number"):
+    with pytest.raises(FsidError, match=r"^size_px: 16\.0 is not a whole number"):
         PatchDataset(dataset, replace(CONFIG, size_px=16.0), seed=0)
 
 

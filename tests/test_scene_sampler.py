@@ -537,7 +537,7 @@ def test_a_list_does_where_two_values_or_names_are_asked_for():
 @pytest.mark.parametrize("given", [{"objects": 5}, {"mesh_families": "mug"}, {"mesh_folders": "meshes"}])
 def test_one_value_is_no_list(given):
     """A text is a list of letters for Python, and one number would fail where it is drawn from."""
-    with pytest.raises(FsidError, match=f"{next(iter(given))} = .*: give a list"):
+    with pytest.raises(FsidError, match=f"{next(iter(given))}: .* is not a list"):
         SceneConfig(**given)
 
 

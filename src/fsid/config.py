@@ -14,9 +14,10 @@ import dataclasses
 import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cache
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import Any, Literal, TypeVar, get_args, get_origin
+from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 import cattrs
 import numpy as np
@@ -98,12 +99,32 @@ def to_plain(settings: Any) -> Any:
     return str(settings) if isinstance(settings, Path) else settings
 
 
-def as_read(settings: T, *, source: str) -> T:
-    """Settings made in Python as a file would give them: lists as tuples, NumPy's numbers as Python's.
+def check_fields(settings: Any) -> None:
+    """For `__post_init__`: make fields what a file would give, lists tuples and NumPy's numbers Python's.
 
-    FsidError, naming `source` and the key, for what no file could hold.
+    FsidError names the first that is of another type than it states.
     """
-    return from_plain(type(settings), to_plain(settings), source=source)
+    made: Any = type(settings)
+    for name, kind in _kinds(made).items():
+        value = getattr(settings, name)
+        if not (isinstance(kind, type) and dataclasses.is_dataclass(kind)):
+            value = _structured(name, to_plain(value), kind)
+        elif not isinstance(value, kind):
+            value = from_plain(kind, to_plain(value), source=name)
+        object.__setattr__(settings, name, value)
+
+
+@cache
+def _kinds(made: Any) -> dict[str, Any]:
+    known = get_type_hints(made)
+    return {field.name: known[field.name] for field in dataclasses.fields(made)}
+
+
+def _structured(name: str, value: Any, kind: Any) -> Any:
+    try:
+        return _CONVERTER.structure(value, kind)
+    except (ValueError, TypeError) as error:
+        raise FsidError(f"{name}: {_reason(error, kind)}") from None
 
 
 def from_plain(kind: type[T], plain: Any, *, source: str) -> T:

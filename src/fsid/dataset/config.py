@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from fsid.config import Override, from_plain, load_named, load_settings, read_yaml
+from fsid.config import Override, check_fields, from_plain, load_named, load_settings, read_yaml
 from fsid.errors import FsidError
 from fsid.scene import VARIANTS, SceneConfig
 
@@ -40,6 +40,7 @@ class Checks:
     duplicate_bits: int = 8
 
     def __post_init__(self) -> None:
+        check_fields(self)
         for key in ("black_share", "blown_share"):
             if not 0 <= getattr(self, key) <= 1:
                 raise FsidError(f"checks.{key}: {getattr(self, key)} is not between 0 and 1")
@@ -89,6 +90,7 @@ class GenerateConfig:
     scene: SceneConfig = field(default_factory=SceneConfig)
 
     def __post_init__(self) -> None:
+        check_fields(self)
         for key in ("width", "height"):
             size = getattr(self, key)
             if size < 32 or size % 2:
@@ -162,6 +164,7 @@ class DatasetConfig:
     pictures_digest: str = ""
 
     def __post_init__(self) -> None:
+        check_fields(self)
         if self.seed < 0:
             raise FsidError(f"seed {self.seed}: must not be negative")
 

@@ -18,7 +18,7 @@ from pathlib import Path
 
 from fsid.assets import sky_sources
 from fsid.assets.survey import KNOWN
-from fsid.config import as_read, from_plain, read_yaml, save_settings, to_plain
+from fsid.config import check_fields, from_plain, read_yaml, save_settings, to_plain
 from fsid.dataset.card import CARD, check_card, write_card
 from fsid.dataset.config import RENDERED, DatasetConfig, GenerateConfig
 from fsid.dataset.crew import Crew, LocalCrew, run
@@ -53,6 +53,7 @@ class Workforce:
     workers_per_gpu: int = 0
 
     def __post_init__(self) -> None:
+        check_fields(self)
         if self.workers < 1 or self.workers_per_gpu < 0:
             raise FsidError("--workers must be at least 1, --workers-per-gpu at least 0")
 
@@ -160,7 +161,6 @@ def pairs_to_make(out: Path, dataset: DatasetConfig, count: int) -> tuple[int, i
 
 def dataset_config(config: GenerateConfig, seed: int, shard_size: int = 0) -> DatasetConfig:
     """The identity of the dataset of (config, seed); FsidError where what it names does not exist."""
-    config = as_read(config, source="config")
     for camera in config.cameras:
         load_bayer_profile(camera)
     check_cameras(config)
@@ -182,7 +182,7 @@ def dataset_config(config: GenerateConfig, seed: int, shard_size: int = 0) -> Da
     if shard_size < 1 or shard_size % pairs:
         raise FsidError(f"shard size {shard_size}: is not a multiple of the {pairs} pairs of a frame")
     digest = pictures_digest(pictures) if pictures else ""
-    return as_read(DatasetConfig(seed, shard_size, config, len(pictures), digest), source="dataset")
+    return DatasetConfig(seed, shard_size, config, len(pictures), digest)
 
 
 @contextmanager

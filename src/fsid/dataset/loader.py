@@ -33,14 +33,14 @@ from collections import OrderedDict
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 import torch
 from torch import Tensor
 from torch.utils.data import Dataset
 
-from fsid.config import as_read
+from fsid.config import check_fields
 from fsid.counted import counted
 from fsid.dataset.cells import Cell, Grid, check_shrink, shrink_for
 from fsid.dataset.index import StoredMosaic, index_mosaics
@@ -108,12 +108,9 @@ class PatchConfig:
     split: Split = "train"
 
     def __post_init__(self) -> None:
+        check_fields(self)
         if self.size_px < 1 or self.batch < 1:
             raise FsidError(f"size_px {self.size_px}, batch {self.batch}: must be at least 1")
-        if self.noise not in get_args(Noise):
-            raise FsidError(f"noise: {self.noise!r} is not one of {', '.join(get_args(Noise))}")
-        if self.split not in get_args(Split):
-            raise FsidError(f"split: {self.split!r} is not one of {', '.join(get_args(Split))}")
         check_shrink(self.shrink)
         if self.noise == "stored" and self.shrink not in ((), (1,)):
             raise FsidError(f"shrink {list(self.shrink)}: stored noise is of the images as they are")
@@ -138,7 +135,7 @@ class PatchDataset(Dataset[Batch]):
         world: int | None = None,
         without: Collection[int] = (),
     ) -> None:
-        data_dir, seed, config = Path(data_dir), operator.index(seed), as_read(config, source="config")
+        data_dir, seed = Path(data_dir), operator.index(seed)
         if not config.profiles:
             raise FsidError("profiles: name at least one camera profile to draw noise from")
         if seed < 0:

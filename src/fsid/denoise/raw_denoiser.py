@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
+from fsid.config import check_fields
 from fsid.denoise.conditioning import Conditioning, clean_estimate, network_input
 from fsid.denoise.nafnet import NAFNet
 from fsid.errors import FsidError
@@ -37,6 +38,7 @@ class NetworkConfig:
     conditioning: Conditioning = "stabilise"
 
     def __post_init__(self) -> None:
+        check_fields(self)
         if len(self.encoder_blocks) != len(self.decoder_blocks):
             raise FsidError("encoder_blocks and decoder_blocks: give equally many scales")
         blocks = (*self.encoder_blocks, self.middle_blocks, *self.decoder_blocks)

@@ -27,7 +27,7 @@ from accelerate.state import AcceleratorState, GradientState, PartialState
 from rich.text import Text
 from torch import Tensor
 
-from fsid.config import as_read, read_json, read_yaml, to_plain
+from fsid.config import read_json, read_yaml, to_plain
 from fsid.counted import counted
 from fsid.dataset.feed import batches
 from fsid.dataset.index import StoredMosaic, identity, index_mosaics
@@ -95,7 +95,7 @@ def train(
     Accelerator of your own are afterwards what they were.
     """
     data_dir, run_dir = Path(data_dir), Path(run_dir)
-    config = sizes_as_begun(run_dir, as_read(config, source="config"))
+    config = sizes_as_begun(run_dir, config)
     if config.threads:
         torch.set_num_threads(config.threads)
     gpu = torch.cuda.is_available()

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from fsid.config import Override, load_named
+from fsid.config import Override, check_fields, load_named
 from fsid.dataset.cells import check_shrink
 from fsid.denoise.raw_denoiser import MAX_PATCH_PX, NetworkConfig
 from fsid.errors import FsidError
@@ -66,6 +66,7 @@ class TrainConfig:
     loader_processes: int = 0
 
     def __post_init__(self) -> None:
+        check_fields(self)
         for key in ("steps", "batch", "patch_px", "log_every", "checkpoint_every", "validate_every"):
             if getattr(self, key) < 1:
                 raise FsidError(f"{key}: must be at least 1, got {getattr(self, key)}")

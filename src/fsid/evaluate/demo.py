@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from fsid.config import check_fields
 from fsid.dataset import (
     GenerateConfig,
     find_shards,
@@ -76,6 +77,9 @@ class DemoConfig:
     steps: int = 0
     photographs: int = len(PHOTOGRAPHS)
     seed: int = 0
+
+    def __post_init__(self) -> None:
+        check_fields(self)
 
 
 def demo(out: Path, config: DemoConfig, bar: ProgressBar) -> Path:

@@ -20,7 +20,7 @@ from itertools import product
 from pathlib import Path
 from typing import Literal
 
-from fsid.config import Override, given_keys, load_settings
+from fsid.config import Override, check_fields, given_keys, load_settings
 from fsid.dataset import (
     RENDERED,
     GenerateConfig,
@@ -100,6 +100,7 @@ class ExperimentConfig:
     train_settings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        check_fields(self)
         if min(self.count, self.materials_scenes) < 1 or self.steps < 0 or not self.seeds:
             raise FsidError("--count and --seeds must name at least one, --steps must not be negative")
         if len(set(self.seeds)) < len(self.seeds):

@@ -11,6 +11,7 @@ import math
 from dataclasses import field, fields
 from typing import Any, TypeVar
 
+from fsid.config import check_fields
 from fsid.errors import FsidError
 
 Range = tuple[float, float]
@@ -29,14 +30,10 @@ def shares(*default: float) -> Any:
 
 
 def check_knobs(settings: Any) -> None:
-    """Raise FsidError that names the first setting outside its limits. Lists become tuples."""
+    """`check_fields`; then raise FsidError that names the first setting outside its limits."""
+    check_fields(settings)
     for item in fields(settings):
         value = getattr(settings, item.name)
-        if isinstance(item.default, tuple):
-            if not isinstance(value, list | tuple):
-                raise FsidError(f"{item.name} = {value!r}: give a list")
-            value = tuple(value)
-            object.__setattr__(settings, item.name, value)
         if "limits" in item.metadata:
             _check_limits(item.name, value, *item.metadata["limits"])
         if "shares" in item.metadata:

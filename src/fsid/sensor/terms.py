@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from fsid.config import check_fields
 from fsid.errors import FsidError
 from fsid.sensor.mosaic import site_offsets
 from fsid.sensor.poisson import poisson
@@ -33,7 +34,7 @@ from fsid.sensor.raw import NoiseLevel, Raw
 class NoiseTerms:
     """See the module docstring for meaning and units; 0 and False switch a term off.
 
-    FsidError: a negative term, or shares (row + column, defective) of 1 and more.
+    FsidError: a term of another type, a negative one, or shares (row + column, defective) of 1 and more.
     """
 
     poisson: bool = False
@@ -48,6 +49,7 @@ class NoiseTerms:
     quantisation: bool = True
 
     def __post_init__(self) -> None:
+        check_fields(self)
         for field in fields(self):
             if not 0 <= getattr(self, field.name) < math.inf:
                 raise FsidError(f"{field.name}: {getattr(self, field.name)} is not a number >= 0")
