@@ -70,7 +70,7 @@ class MaterialConfig:
     variation: Range = knob((0.15, 0.8), 0.0, 1.0)
     """How much of the colour differences within one material is left in those scenes."""
     layer_share: float = knob(0.03, 0.0, 1.0)
-    """Share of materials under dust, dirt, scratches or another layer of wear."""
+    """Share of materials but plain paint under dust, dirt, scratches or another layer of wear."""
     lobe_share: float = knob(0.7, 0.0, 1.0)
     """Share of parts with the extra lobe that their kind suggests (glass transmits, cloth has sheen ...)."""
     coat_share: float = knob(0.1, 0.0, 1.0)
