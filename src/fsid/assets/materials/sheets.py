@@ -294,7 +294,7 @@ def circuit_board(rng: np.random.Generator, variant: int, size: int) -> Layers:
 
 
 def _shifts(at: list[float], reach: float, wide: int) -> list[int]:
-    """Where a thing at these places, `reach` to both sides of them, is on the canvas, which repeats."""
+    """Shifts in pixels of a thing at these places, `reach` to both sides, on the canvas, which repeats."""
     return [s for s in (-wide, 0, wide) if max(at) + reach + s > 0 and min(at) - reach + s < wide]
 
 
