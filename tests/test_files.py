@@ -16,7 +16,7 @@ from fsid.dataset.photos import read_photo
 from fsid.dataset.pictures import read_exr
 from fsid.errors import FsidError
 from fsid.evaluate.testset import TESTSET_FILE, read_testset
-from fsid.files import write_atomically, write_together
+from fsid.files import check_folder, make_folder, write_atomically, write_together
 from fsid.sensor import load_profile
 
 
@@ -105,6 +105,16 @@ def test_a_place_that_is_no_folder_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(FsidError, match="cannot be written"):
         write_atomically(tmp_path / "file" / "a", b"new")
+
+
+@pytest.mark.parametrize("make", [make_folder, check_folder])
+@pytest.mark.parametrize("inside", ["", "deeper/still"])
+def test_a_link_to_nothing_is_no_folder(tmp_path: Path, make: Callable[[Path], None], inside: str) -> None:
+    """The system says that it exists, and Python that it does not."""
+    (tmp_path / "out").symlink_to(tmp_path / "gone")
+    with pytest.raises(FsidError, match=r"cannot be written; .*/out is (a link to .*/gone|no folder)"):
+        make(tmp_path / "out" / inside)
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
 
 @pytest.fixture

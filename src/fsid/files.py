@@ -80,7 +80,7 @@ def write_together(files: Mapping[Path, bytes]) -> None:
 
 def check_folder(folder: Path) -> None:
     """FsidError unless `folder` is there or can be made, and be written to: before the work that fills it."""
-    there = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+    there = next(path for path in (folder, *folder.absolute().parents) if os.path.lexists(path))
     if not (there.is_dir() and os.access(there, os.W_OK | os.X_OK)):
         raise FsidError(f"{folder}: cannot be written; {there} is no folder that you may write to")
 
@@ -94,6 +94,18 @@ def check_output(path: Path) -> None:
     check_folder(path.parent)
 
 
+def make_folder(folder: Path) -> None:
+    """`folder` is there afterwards, and all above it. FsidError where it cannot be made."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except FileExistsError:
+        there = next(path for path in (folder, *folder.absolute().parents) if os.path.lexists(path))
+        reason = f"a link to {there.readlink()}, which is not there" if there.is_symlink() else "no folder"
+        raise FsidError(f"{folder}: cannot be written; {there} is {reason}") from None
+    except OSError as error:
+        raise FsidError(f"{folder}: cannot be written ({error.strerror})") from None
+
+
 @contextlib.contextmanager
 def held(folder: Path, taken: str) -> Iterator[bool]:
     """`folder` exists and is this process's until the end of the block, or until it dies.
@@ -101,8 +113,8 @@ def held(folder: Path, taken: str) -> Iterator[bool]:
     Yields whether that is sure: some network file systems know no locks. FsidError where it cannot be made,
     or where another process has it: `taken` says what that does.
     """
+    make_folder(folder)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
         descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     except OSError as error:
         raise FsidError(f"{folder}: cannot be written ({error.strerror})") from None

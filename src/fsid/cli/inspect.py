@@ -43,7 +43,7 @@ def inspect(
     from fsid.dataset.inspect_plot import inspection_picture
     from fsid.dataset.statistics import TITLES
     from fsid.errors import FsidError
-    from fsid.files import check_folder, write_together
+    from fsid.files import check_folder, make_folder, write_together
 
     if out is not None:
         check_folder(out)
@@ -72,8 +72,5 @@ def inspect(
             out / "statistics.png": inspection_picture(found),
             out / "statistics.json": inspection_json(found),
         }
-        try:
-            out.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise FsidError(f"{out}: cannot be made ({error.strerror})") from None
+        make_folder(out)
         write_together(results)

@@ -14,7 +14,7 @@ from fsid.dataset.sample import encode, make_sample, remake
 from fsid.dataset.shards import read_record, read_records, shard_path
 from fsid.dataset.worker import rendering
 from fsid.errors import FsidError
-from fsid.files import read_whole, write_atomically
+from fsid.files import make_folder, read_whole, write_atomically
 
 
 def make_only(
@@ -31,10 +31,7 @@ def make_only(
     what it is, redrawn or not; where there are shards and none of them has it, note(line) is called.
     FsidError: unusable key or settings, or others than those of the dataset.
     """
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FsidError(f"{out}: cannot be written ({error.strerror})") from None
+    make_folder(out)
     sample = _from_json(Path(key)) if key.endswith(".json") else _from_key(out, key, config, seed, note)
     paths = []
     for extension, data in encode(sample).items():

@@ -14,7 +14,7 @@ from pathlib import Path
 from fsid.denoise.denoise import Network, check_strength, denoise_raw
 from fsid.denoise.preview import preview_of
 from fsid.errors import FsidError
-from fsid.files import check_output, paths_of
+from fsid.files import check_output, make_folder, paths_of
 from fsid.sensor import (
     Layout,
     NoiseLevel,
@@ -211,10 +211,7 @@ def denoise_folder(
         left = [pair for pair in zip(paths, targets, strict=True) if not pair[1].is_file()]
         paths, targets = [source for source, _ in left], [out for _, out in left]
     is_new = not target.exists()
-    try:
-        target.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FsidError(f"{target}: cannot be written ({error.strerror})") from None
+    make_folder(target)
     noises: dict[Path, Noise] = {}
     for done, (source, out) in enumerate(zip(paths, targets, strict=True)):
         try:

@@ -12,6 +12,7 @@ from fsid.denoise.model import Denoiser
 from fsid.denoise.sessions import read_sessions
 from fsid.denoise.train_config import TrainConfig
 from fsid.errors import FsidError
+from fsid.files import make_folder
 
 CONFIG_FILE = "config.yaml"
 _WITHOUT_EFFECT = {"checkpoint_every", "loader_processes", "tensorboard"}
@@ -53,7 +54,7 @@ def prepare_run(data_dir: Path, run_dir: Path, config: TrainConfig, initial: Den
         _check_same_run(data_dir, run_dir, there, config)
     try:
         if not is_begun:
-            run_dir.mkdir(parents=True, exist_ok=True)
+            make_folder(run_dir)
             drop_initial(run_dir)  # first: it may be of other settings
         if there != config:
             save_settings(config, file)

@@ -46,7 +46,7 @@ from fsid.evaluate.models import model_method
 from fsid.evaluate.plots import loss_plot, noise_profile_plot
 from fsid.evaluate.report import Section, picture, write_report
 from fsid.evaluate.testset import photo_testset
-from fsid.files import write_atomically
+from fsid.files import make_folder, write_atomically
 from fsid.sensor import develop, load_profile, read_raw
 
 PHOTOGRAPHS = (
@@ -149,7 +149,7 @@ def _training(config: DemoConfig) -> TrainConfig:
 
 def _copy_photographs(folder: Path, count: int) -> Path:
     """Photographs that installed packages ship, as a folder."""
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     for package, name in PHOTOGRAPHS[:count]:
         with as_file(files(package).joinpath(name)) as file:
             write_atomically(folder / file.name, file.read_bytes())

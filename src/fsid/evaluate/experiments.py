@@ -51,7 +51,7 @@ from fsid.evaluate.models import model_method
 from fsid.evaluate.simulated import LUXES, simulated_testset
 from fsid.evaluate.testbench import MATERIALS
 from fsid.evaluate.testset import ALL_SETS, levels_of, photo_testset, read_testset
-from fsid.files import read_whole
+from fsid.files import make_folder, read_whole
 from fsid.scene import VARIANTS
 from fsid.sensor import load_bayer_profile
 
@@ -304,7 +304,7 @@ def _measured(
     """Figures of methods on all test sets; kept in stem.csv, and read from there the next time."""
     file = stem.with_suffix(".csv")
     if not file.exists():
-        file.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(file.parent)
         images: list[ImageRow] = []
         for testset in testsets:
             with bar(f"measuring {stem.name} on {testset.name}", "captures") as progress:

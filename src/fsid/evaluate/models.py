@@ -10,6 +10,7 @@ from fsid.counted import counted
 from fsid.errors import FsidError
 from fsid.evaluate.compare import CLASSICAL, NOISY, Comparison, Method, compare, write_images, write_results
 from fsid.evaluate.testset import read_testset
+from fsid.files import make_folder
 
 
 def model_method(path: str | Path, name: str) -> Method:
@@ -64,10 +65,7 @@ def write_comparison(comparison: Comparison, testset: str | Path, out: str | Pat
     from fsid.evaluate.report import write_report
 
     testset, out = Path(testset), Path(out)
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FsidError(f"{out}: cannot be written ({error.strerror})") from None
+    make_folder(out)
     write_results(comparison.rows, out / "results.json")
     write_images(comparison.images, out / "images.csv")
     made = comparison.testset
