@@ -22,6 +22,9 @@ from fsid.config import parse_json
 from fsid.errors import FsidError
 from fsid.files import check_file
 
+_PART = re.compile(r"\.shard-\d+\.tar\..+-\d+\.part|(config\.yaml|README\.md|samples\.png)(\.\d+)?\.part")
+"""Names that writers give (`part_path`, `fsid.files.write_together`) and people hardly do."""
+
 
 def shard_path(folder: str | Path, number: int) -> Path:
     """Path of shard `number`."""
@@ -39,11 +42,10 @@ def remove_parts(folder: Path, unused_s: float = 0) -> None:
     A writer that is alive after all fails, harmlessly.
     """
     latest = time.time() - unused_s
-    for pattern in (".shard-*.part", "config.yaml*.part", "README.md*.part", "samples.png*.part"):
-        for part in folder.glob(pattern):
-            with suppress(FileNotFoundError):  # its writer was faster
-                if not unused_s or part.stat().st_mtime < latest:
-                    part.unlink()
+    for part in folder.iterdir():
+        with suppress(FileNotFoundError):  # its writer was faster
+            if _PART.fullmatch(part.name) and (not unused_s or part.stat().st_mtime < latest):
+                part.unlink()
 
 
 def find_shards(folder: str | Path) -> list[Path]:
