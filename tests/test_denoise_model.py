@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -51,6 +52,16 @@ def test_what_is_not_a_model_is_named(model_file: Path, tmp_path: Path) -> None:
         model_file.write_bytes(broken)
         with pytest.raises(FsidError, match=r"model\.safetensors"):
             load_denoiser(model_file)
+
+
+def test_a_folder_whose_name_is_no_text_is_named_as_such(model_file: Path) -> None:
+    """What is in it is a model, which safetensors cannot open there."""
+    try:
+        folder = model_file.parent.rename(model_file.parent.with_name(os.fsdecode(b"run\xff")))
+    except OSError:
+        pytest.skip("this file system takes names in UTF-8 alone")
+    with pytest.raises(FsidError, match=r"not UTF-8; rename it"):
+        load_denoiser(folder)
 
 
 @pytest.mark.parametrize("device", ["gpu", "meta", "cuda:99"])

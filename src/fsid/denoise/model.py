@@ -197,6 +197,8 @@ def read_tensors(path: Path, expected: str) -> tuple[dict[str, Tensor], dict[str
     """Tensors and header of a safetensors file; FsidError says that `path` is not `expected`."""
     if not os.path.isfile(path):
         raise FsidError(f"{path}: no such file; expected {expected}")
+    if any("\ud800" <= letter <= "\udfff" for letter in str(path)):
+        raise FsidError(f"{path}: safetensors opens no file whose path is not UTF-8; rename it")
     try:
         with safe_open(path, framework="pt") as file:
             return {name: file.get_tensor(name) for name in file.keys()}, file.metadata() or {}  # noqa: SIM118
