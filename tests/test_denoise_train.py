@@ -696,6 +696,20 @@ def test_a_step_follows_the_settings_of_the_optimizer() -> None:
     assert float(sum(gradients)) ** 0.5 == pytest.approx(1e-3, rel=1e-3)
 
 
+def test_the_colours_of_a_validation_photograph_are_not_drawn_from_its_noise(
+    photos: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn, default_rng = [], np.random.default_rng
+
+    def recorded(seed: list[int]) -> np.random.Generator:
+        drawn.append(default_rng(seed).random())
+        return default_rng(seed)
+
+    monkeypatch.setattr("fsid.denoise.validate.np.random.default_rng", recorded)
+    validation([], replace(CONFIG, validation_photos=str(photos)), torch.device("cpu"))
+    assert len(set(drawn)) == len(drawn) >= 4
+
+
 def test_validation_takes_turns_with_the_cameras() -> None:
     config = replace(CONFIG, profiles=("pixel6", "galaxy-s22"))
     isos = np.geomspace(config.iso_min, config.iso_max, 3)

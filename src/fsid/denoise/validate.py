@@ -104,8 +104,12 @@ def _read(mosaic: StoredMosaic) -> Raw:
 
 def _photos(folder: Path, config: TrainConfig) -> list[Raw]:
     profile = load_profile(config.profiles[0])
-    return [
-        _window(clean_from_photo(np.random.default_rng([config.seed, _STREAM, i]), read_photo(path), profile))
+    return [  # of NumPy, [seed, stream, i] and [seed, stream, i, 0] are one generator
+        _window(
+            clean_from_photo(
+                np.random.default_rng([config.seed, _STREAM, i, ISO_LEVELS]), read_photo(path), profile
+            )
+        )
         for i, path in enumerate(find_photos(folder)[:_MAX_PHOTOS])
     ]
 
