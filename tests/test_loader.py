@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import tifffile
 
 torch = pytest.importorskip("torch")
 
@@ -443,6 +444,31 @@ def test_levels_are_what_a_rational_says(numerator: int, named: str, tmp_path: P
             index_mosaics(tmp_path)
     else:
         assert index_mosaics(tmp_path)[0].black_level == read_raw(file).black_level == 64
+
+
+@pytest.mark.parametrize(
+    ("tag", "named"),
+    [
+        ((50829, "I", 4, (0, 0, HEIGHT, WIDTH)), ""),
+        ((50829, "I", 4, (3, 5, HEIGHT, WIDTH)), "an active area"),
+        ((50716, "2i", HEIGHT, (0, 1) * HEIGHT), ""),
+        ((50716, "2i", HEIGHT, (3, 1) * HEIGHT), "black levels of rows or columns"),
+        ((50715, "2i", WIDTH, (-3, 2) * WIDTH), "black levels of rows or columns"),
+        ((50712, "H", 2, (0, 700)), "a linearization table"),
+    ],
+)
+def test_pixels_that_are_not_what_is_stored_are_refused(tag: tuple, named: str, tmp_path: Path) -> None:
+    """As the masked margins of a stranger's DNG, which were trained on as black parts of a clean image."""
+    cfa, levels = (33422, "B", 4, (0, 1, 1, 2)), [(50714, "H", 1, 64), (50717, "H", 1, 1023)]
+    tags = [(*each, True) for each in (cfa, *levels, tag)]
+    page, file = np.full((HEIGHT, WIDTH), 300, np.uint16), io.BytesIO()
+    tifffile.imwrite(file, page, photometric=32803, byteorder="<", extratags=tags)
+    write_shard(shard_path(tmp_path, 0), [("00000000", {"clean.dng": file.getvalue()})])
+    if named:
+        with pytest.raises(FsidError, match=rf"clean\.dng states {named}.*; rewrite it with read_raw"):
+            index_mosaics(tmp_path)
+    else:
+        assert index_mosaics(tmp_path)[0].black_level == 64
 
 
 def addresses(tmp_path: Path, per_shard: tuple[int, ...]) -> Path:

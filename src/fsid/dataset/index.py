@@ -217,6 +217,11 @@ def _read_header(shard: Path, member: tarfile.TarInfo, key: str) -> StoredMosaic
         raise FsidError(
             f"{where} is not one uncompressed little-endian uint16 strip; write it with `fsid generate`"
         )
+    if told := _told_of_pixels(page):
+        raise FsidError(
+            f"{where} states {told}, and training takes pixels as they are stored; "
+            "rewrite it with read_raw and write_dng"
+        )
     check_levels(mosaic.black_level, mosaic.white_level, where)
     if mosaic.offset + 2 * mosaic.height * mosaic.width > member.offset_data + member.size:
         raise FsidError(f"{where} is truncated; delete the shard and generate again")
@@ -231,10 +236,29 @@ def _mosaic_page(dng: tifffile.TiffFile) -> tifffile.TiffPage:
     )
 
 
+def _told_of_pixels(page: tifffile.TiffPage) -> str:
+    """What a DNG of another writer says of its pixels that makes them others than those stored, or ""."""
+    tags = page.tags
+    if dng_tags.LINEARIZATION in tags:
+        return "a linearization table"
+    whole = [0, 0, page.imagelength, page.imagewidth]
+    if dng_tags.ACTIVE_AREA in tags and _numbers(tags[dng_tags.ACTIVE_AREA]) != whole:
+        return "an active area within them"
+    deltas = (dng_tags.BLACK_DELTA_H, dng_tags.BLACK_DELTA_V)
+    if any(code in tags and any(_numbers(tags[code])) for code in deltas):
+        return "black levels of rows or columns"
+    return ""
+
+
+def _numbers(tag: tifffile.TiffTag) -> list[float]:
+    values = tag.value if isinstance(tag.value, tuple) else (tag.value,)
+    is_fraction = tag.dtype in (tifffile.DATATYPE.RATIONAL, tifffile.DATATYPE.SRATIONAL)
+    return quotients(values) if is_fraction else list(values)
+
+
 def _level(tag: tifffile.TiffTag) -> int:
     """A level tag holds one number or one per site, each of them perhaps a rational; here all are one DN."""
-    values = tag.value if isinstance(tag.value, tuple) else (tag.value,)
-    levels = quotients(values) if tag.dtype == tifffile.DATATYPE.RATIONAL else values
+    levels = _numbers(tag)
     if len(set(levels)) != 1 or levels[0] != int(levels[0]):
         stated = ", ".join(f"{level:g}" for level in levels) or "no number"
         raise ValueError(f"its {tag.name} states {stated}; one whole number is needed")
