@@ -18,6 +18,7 @@ from fsid.sensor import (
     NoiseLevel,
     Raw,
     clean_levels,
+    develop,
     dng_pixel_offset,
     load_profile,
     quantise,
@@ -30,7 +31,7 @@ from fsid.sensor.dng import read_stored
 from fsid.sensor.dng_tags import noise_profile
 from fsid.sensor.frames import find_frames
 from fsid.sensor.metadata import Metadata
-from fsid.sensor.tiff import ASCII, BYTE, CFA, LONG, SHORT, Directory, Tag, image_tags, tiff_bytes
+from fsid.sensor.tiff import ASCII, BYTE, CFA, LONG, SHORT, SRATIONAL, Directory, Tag, image_tags, tiff_bytes
 
 HEIGHT, WIDTH = 34, 50
 PREVIEW = np.random.default_rng(0).integers(0, 256, (17, 25, 3)).astype(np.uint8)
@@ -309,6 +310,28 @@ def test_black_levels_that_fit_no_pattern_are_one_or_refused(tmp_path, repeat, l
             read_raw(tmp_path / "a.dng")
     else:
         assert read_raw(tmp_path / "a.dng").black_level == level
+
+
+@pytest.mark.parametrize("rows", [(1,) * 9, (1, -1, 0) * 3, (1, *(0,) * 8), (-1, 0, 0, 0, 1, 0, 0, 0, 1)])
+def test_colours_that_no_camera_has_are_refused(tmp_path, rows):
+    """They ended with a traceback where a picture was developed, or with a picture of NaN."""
+    matrix = Tag(50721, SRATIONAL, tuple(n for value in rows for n in (value, 1)))
+    source = Metadata(first=(matrix, Tag(50778, SHORT, (21,))))
+    write_dng(tmp_path / "a.dng", replace(_raw(), xyz_to_camera=np.reshape(rows, (3, 3)), metadata=source))
+    with pytest.raises(FsidError, match=r"a\.dng: its ColorMatrix has no inverse"):
+        read_raw(tmp_path / "a.dng")
+    with pytest.raises(FsidError, match="no camera sees colours"):
+        develop(replace(_raw(), xyz_to_camera=np.reshape(rows, (3, 3))))
+
+
+def test_private_data_nested_without_end_is_none(tmp_path):
+    nested = Tag(50740, BYTE, b"FSID\0" + b"[" * 100_000)
+    levels = [Tag(50714, SHORT, (64,)), Tag(50717, SHORT, (1023,)), Tag(50706, BYTE, bytes((1, 4, 0, 0)))]
+    pattern = [Tag(33421, SHORT, (2, 2)), Tag(33422, BYTE, bytes((0, 1, 1, 2)))]
+    pixels = np.full((32, 40), 70, np.uint16)
+    tags = (*image_tags(pixels, CFA, 0), *levels, *pattern, nested)
+    (tmp_path / "a.dng").write_bytes(tiff_bytes(Directory(tags, pixels)))
+    assert read_raw(tmp_path / "a.dng").noise is None
 
 
 @pytest.mark.parametrize(

@@ -45,7 +45,14 @@ def srgb_to_camera_matrix(xyz_to_camera: np.ndarray) -> np.ndarray:
 
 
 def camera_to_srgb_matrix(xyz_to_camera: np.ndarray) -> np.ndarray:
-    """(3, 3) float64 white-balanced camera RGB -> linear sRGB (the CCM), rows summing to 1."""
+    """(3, 3) float64 white-balanced camera RGB -> linear sRGB (the CCM), rows summing to 1.
+
+    FsidError unless `is_of_camera`.
+    """
+    if not is_of_camera(np.asarray(xyz_to_camera, np.float64)):
+        raise FsidError(
+            f"xyz_to_camera {np.round(xyz_to_camera, 4).tolist()}: no camera sees colours like that"
+        )
     return np.linalg.inv(srgb_to_camera_matrix(xyz_to_camera))
 
 

@@ -23,7 +23,7 @@ from fsid.files import write_atomically
 from fsid.sensor import dng_tags
 from fsid.sensor.bare import BARE_SUFFIXES
 from fsid.sensor.black_levels import BlackLevels
-from fsid.sensor.colour import published_matrices
+from fsid.sensor.colour import is_of_camera, published_matrices
 from fsid.sensor.embedded import embedded_directories
 from fsid.sensor.intact import check_intact, check_order
 from fsid.sensor.metadata import Metadata, kept_metadata, libraw_metadata, taken
@@ -109,7 +109,7 @@ def read_raw(path: str | Path | BinaryIO) -> Raw:
     fractions of a DN) are subtracted each; `black_level` is their rounded mean. Unknown colour becomes the
     mean of the published matrices, unknown white balance (1, 1, 1), unknown ISO 0.
     FsidError: missing, truncated, zeros in place of pixels, no RAW, a bare mosaic, not Bayer (X-Trans,
-    Foveon, linear DNG, monochrome), floating point.
+    Foveon, linear DNG, monochrome), floating point, black levels or colours that cannot be.
     """
     given = Path(path) if isinstance(path, str) else path
     with _opened(given) as (file, source):
@@ -242,7 +242,7 @@ def _from_libraw(file: rawpy.RawPy, source: _Source, path: Path) -> Raw:
         black_level=stored.black_level,
         white_level=stored.white_level,
         white_balance=_white_balance(file),
-        xyz_to_camera=_xyz_to_camera(file, tags),
+        xyz_to_camera=_xyz_to_camera(file, tags, path),
         camera=dng_tags.camera_name(tags),
         iso=_iso(file, tags),
         noise=dng_tags.noise_level(tags),
@@ -322,8 +322,12 @@ def _iso(file: rawpy.RawPy, tags: dict[int, Values]) -> float:
     return dng_tags.iso_speed(tags) or float(getattr(getattr(file, "other", None), "iso_speed", 0.0))
 
 
-def _xyz_to_camera(file: rawpy.RawPy, tags: dict[int, Values]) -> np.ndarray:
+def _xyz_to_camera(file: rawpy.RawPy, tags: dict[int, Values], path: Path) -> np.ndarray:
     matrix = dng_tags.d65_matrix(tags)
     if matrix is None:
         matrix = np.asarray(file.rgb_xyz_matrix[:3], np.float64)
-    return matrix if np.any(matrix) else published_matrices().mean(axis=0)
+    if not np.any(matrix):
+        return published_matrices().mean(axis=0)
+    if not is_of_camera(matrix):
+        raise FsidError(f"{path}: its ColorMatrix has no inverse or no light in white; correct this tag")
+    return matrix

@@ -241,7 +241,7 @@ def _private_numbers(tags: Tags) -> Any:
     try:
         values = json.loads(data[len(_OWNER) :])
         numbers = tuple(float(v) for v in (values["iso"], *values.get("k", ()), *values.get("sigma2", ())))
-    except (ValueError, TypeError, KeyError, AttributeError):
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
         return ()
     return numbers if np.all(np.isfinite(numbers)) else ()
 
