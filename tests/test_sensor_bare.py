@@ -9,6 +9,7 @@ from PIL import Image
 
 from fsid.errors import FsidError
 from fsid.sensor import CFA_PATTERNS, develop, pack, raw_from_dn, read_mosaic, unpack
+from fsid.sensor.bare import read_dn
 
 DN = np.random.default_rng(0).integers(0, 4096, (6, 8)).astype(np.uint16)
 CAMERA = {"cfa": "GRBG", "black_level": 256, "white_level": 4095}
@@ -154,6 +155,19 @@ def test_a_tiff_of_several_mosaics_is_refused(tmp_path):
     tifffile.imwrite(tmp_path / "a.tif", np.stack([DN, DN]), photometric="minisblack")
     with pytest.raises(FsidError, match=r"a\.tif: .*several mosaics"):
         read_mosaic(tmp_path / "a.tif", **CAMERA)
+
+
+def test_a_thumbnail_before_the_mosaic_is_not_read_for_it(tmp_path):
+    with tifffile.TiffWriter(tmp_path / "a.tif") as file:
+        file.write(DN[::2, ::2], photometric="minisblack", subfiletype=1)
+        file.write(DN, photometric="minisblack")
+    np.testing.assert_array_equal(read_dn(tmp_path / "a.tif"), DN)
+
+
+def test_a_size_below_0_is_none(tmp_path):
+    DN.tofile(tmp_path / "a.raw")
+    with pytest.raises(FsidError, match=r"a\.raw: a headerless mosaic needs its width and height"):
+        read_dn(tmp_path / "a.raw", width=-DN.shape[1], height=-DN.shape[0])
 
 
 def test_a_mosaic_in_memory_is_that_of_its_file(tmp_path):

@@ -230,10 +230,12 @@ def _read_png(path: Path) -> np.ndarray:
 
 def _read_tiff(path: Path) -> np.ndarray:
     with tifffile.TiffFile(path) as file:
-        _check_size(file.pages.first.shape)
-        if sum(page.shape == file.pages.first.shape for page in file.pages) > 1:
+        whole = (page for page in file.pages if not getattr(page, "is_reduced", False))
+        page = next(whole, file.pages.first)
+        _check_size(page.shape)
+        if sum(other.shape == page.shape for other in file.pages) > 1:
             raise ValueError("it holds several mosaics; write each to a file of its own")
-        return file.pages.first.asarray()
+        return page.asarray()
 
 
 def _check_size(shape: tuple[int, ...]) -> None:
@@ -243,7 +245,8 @@ def _check_size(shape: tuple[int, ...]) -> None:
 
 
 def _read_headerless(path: Path, width: int | None, height: int | None) -> np.ndarray:
-    if not width or not height:
+    width, height = width or 0, height or 0
+    if min(width, height) < 1:
         raise FsidError(f"{path}: a headerless mosaic needs its width and height")
     expected, found = 2 * width * height, path.stat().st_size
     if found != expected:
