@@ -241,6 +241,15 @@ def test_of_many_layers_the_one_with_all_light_is_read(in_parts: bool, tmp_path:
         read_exr(path)
 
 
+def test_the_brightness_of_a_picture_in_colour_is_not_read_as_grey(tmp_path: Path) -> None:
+    """Luminance and chroma are what OpenEXR itself writes where small files are asked for."""
+    openexr = pytest.importorskip("OpenEXR")
+    channels = {name: np.ones((64, 96), np.float32) for name in ("Y", "RY", "BY")}
+    openexr.File({"type": openexr.scanlineimage}, channels).write(str(tmp_path / "chroma.exr"))
+    with pytest.raises(FsidError, match=r"chroma\.exr: has the channels BY, RY, Y; R, G and B"):
+        read_exr(tmp_path / "chroma.exr")
+
+
 def test_bad_renders_are_named(tmp_path: Path) -> None:
     light = np.ones((64, 64, 3), np.float32)
     rec2020 = (0.708, 0.292, 0.17, 0.797, 0.131, 0.046, 0.3127, 0.329)

@@ -151,7 +151,7 @@ def _light_of(path: Path, parts: list[dict[str, np.ndarray]]) -> list[np.ndarray
         for name in channels:
             layer, _, last = name.rpartition(".")
             prefix = name[: -len(last)]
-            is_grey = last == "Y" and prefix + "X" not in channels  # else a vector
+            is_grey = last == "Y" and not {prefix + "X", prefix + "RY"} & channels.keys()  # vector, chroma
             names = [name] * 3 if is_grey else [prefix + colour for colour in "RGB"]
             if (last == "R" or is_grey) and all(n in channels for n in names):
                 layers.setdefault(layer, [channels[n] for n in names])
