@@ -312,6 +312,29 @@ def test_black_levels_that_fit_no_pattern_are_one_or_refused(tmp_path, repeat, l
         assert read_raw(tmp_path / "a.dng").black_level == level
 
 
+@pytest.mark.parametrize("gains", [(0.11, 1.0, 9.0), (99.0, 1.0, 1.0), (1.0, 1.0, 0.0102)])
+def test_any_white_balance_that_is_written_comes_back(tmp_path, gains):
+    write_dng(tmp_path / "a.dng", replace(_raw(), white_balance=gains))
+    np.testing.assert_allclose(read_raw(tmp_path / "a.dng").white_balance, gains, rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"white_balance": (500.0, 1.0, 1.0)}, "white_balance"),
+        ({"white_balance": (20.0, 1.0, 0.1)}, "white_balance"),
+        ({"xyz_to_camera": np.eye(3) * 1e-9}, "xyz_to_camera"),
+        ({"xyz_to_camera": np.eye(3) * 1e12}, "xyz_to_camera"),
+        ({"noise": NoiseLevel(k=(np.nan,) * 4, sigma2=(0.0,) * 4)}, "four finite numbers"),
+        ({"noise": NoiseLevel(k=(0.1,) * 3, sigma2=(0.0,) * 3)}, "four finite numbers"),
+    ],
+)
+def test_what_would_come_back_as_something_else_is_not_written(tmp_path, change, words):
+    with pytest.raises(FsidError, match=words):
+        write_dng(tmp_path / "a.dng", replace(_raw(), **change))
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize("rows", [(1,) * 9, (1, -1, 0) * 3, (1, *(0,) * 8), (-1, 0, 0, 0, 1, 0, 0, 0, 1)])
 def test_colours_that_no_camera_has_are_refused(tmp_path, rows):
     """They ended with a traceback where a picture was developed, or with a picture of NaN."""

@@ -49,6 +49,8 @@ from fsid.sensor.tiff import (
 _FULL_IMAGE, _REDUCED_IMAGE = 0, 1  # TIFF NewSubfileType
 _FLOATING_POINT = 3  # TIFF SampleFormat
 _LEAST_GAIN = 1e-3  # of a white balance, whose inverse a DNG's fractions hold
+_MOST_RATIO = 99  # of its gains: LibRaw believes no more
+_LARGEST = (1e-3, 2e3)  # number of a matrix that a DNG's fractions hold
 
 
 def write_dng(target: str | Path | BinaryIO, raw: Raw, preview: np.ndarray | None = None) -> None:
@@ -56,8 +58,8 @@ def write_dng(target: str | Path | BinaryIO, raw: Raw, preview: np.ndarray | Non
 
     preview: (h, w, 3) uint8 sRGB, stored as the image that file managers show. Values outside the camera's
     0..white_level are clipped as the camera would. FsidError for what a DNG does not hold: NaN, a filter
-    pattern that is not Bayer, levels that are no whole DN, gains of a white balance that are 0 or infinite,
-    a matrix that is not (3, 3).
+    pattern that is not Bayer, levels that are no whole DN, gains of a white balance or numbers of a matrix
+    that come back as others, a noise level that is none.
     """
     data = _dng_bytes(raw, preview)
     if not isinstance(target, str | Path):
@@ -190,11 +192,22 @@ def _check_storable(raw: Raw) -> None:
         raise FsidError(
             f"{raw.camera}: black and white level {levels} are not whole DN, as a DNG states them"
         )
-    gains = raw.white_balance
-    if not min(gains) > _LEAST_GAIN:
-        raise FsidError(f"{raw.camera}: white_balance {gains}: a DNG holds gains above {_LEAST_GAIN}")
-    if not np.all(np.isfinite(raw.xyz_to_camera)):
-        raise FsidError(f"{raw.camera}: xyz_to_camera {raw.xyz_to_camera} must hold finite numbers")
+    gains, largest = raw.white_balance, np.max(np.abs(raw.xyz_to_camera))
+    if not (min(gains) > _LEAST_GAIN and max(gains) <= _MOST_RATIO * min(gains)):
+        raise FsidError(
+            f"{raw.camera}: white_balance {gains}: a DNG holds gains above {_LEAST_GAIN}, "
+            f"the largest at most {_MOST_RATIO} times the least"
+        )
+    if not _LARGEST[0] <= largest <= _LARGEST[1]:
+        raise FsidError(
+            f"{raw.camera}: the largest number of xyz_to_camera is {largest:g}; "
+            f"a DNG holds {_LARGEST[0]:g} to {_LARGEST[1]:g}"
+        )
+    if raw.noise is not None and not (
+        np.shape(raw.noise.k) == np.shape(raw.noise.sigma2) == (4,)
+        and np.isfinite([*raw.noise.k, *raw.noise.sigma2]).all()
+    ):
+        raise FsidError(f"{raw.camera}: {raw.noise}: a DNG holds four finite numbers of each")
     if not math.isfinite(raw.iso):
         raise FsidError(f"{raw.camera}: iso {raw.iso} must be finite, 0 where unknown")
 
