@@ -446,6 +446,15 @@ def test_levels_are_what_a_rational_says(numerator: int, named: str, tmp_path: P
         assert index_mosaics(tmp_path)[0].black_level == read_raw(file).black_level == 64
 
 
+@pytest.mark.parametrize("k", [-1e-3, 5.0])
+def test_stored_noise_that_cannot_be_is_named(k: float, tmp_path: Path) -> None:
+    """Of a variance below 0 the network makes NaN, and NaN of itself."""
+    clean = raw(np.full((HEIGHT, WIDTH), 30_000))
+    write_pairs(tmp_path, [clean], [replace(clean, noise=NoiseLevel((k,) * 4, (1e-5,) * 4))])
+    with pytest.raises(FsidError, match=rf"00000000\.noisy\.dng: .*{k}.* are variances"):
+        PatchDataset(tmp_path, replace(CONFIG, noise="stored"), seed=0)
+
+
 @pytest.mark.parametrize(
     ("tag", "named"),
     [

@@ -307,6 +307,10 @@ def _noisy_of(
         capture = noisy.get((clean.shard, clean.key))
         if capture is None or capture.noise is None:
             raise FsidError(f"{clean.shard}: {clean.key} has no noisy image that states its noise")
+        try:
+            capture.noise.check()
+        except FsidError as error:
+            raise FsidError(f"{clean.shard}: {clean.key}.noisy.dng: {error}") from None
         if (capture.height, capture.width, capture.cfa) != (clean.height, clean.width, clean.cfa):
             raise FsidError(
                 f"{clean.shard}: {clean.key} is no denoising pair, its two images differ in size or CFA"
