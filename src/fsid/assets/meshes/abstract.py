@@ -279,9 +279,9 @@ def _faceted(solid: Solid) -> Solid:
 
 
 def _skirt(top: np.ndarray) -> Solid:
-    """Block below a height field (n, m, 3): four sides and the bottom at z = 0, just below the surface."""
+    """Block below a height field (n, m, 3): four sides and the bottom at z = 0, up into its sheet."""
     border = np.concatenate([top[0, :-1], top[:-1, -1], top[-1, :0:-1], top[:0:-1, 0]])
-    inset = border * (0.999, 0.999, 1) - np.array((0, 0, 0.0012))
+    inset = border * (0.999, 0.999, 1) - np.array((0, 0, 0.0003))
     ring = np.stack([inset * (1, 1, 0), inset])
     solid = loft(ring)
     keep = np.abs(solid.normals[solid.faces[:, 0]][:, 2]) < 0.5

@@ -88,15 +88,14 @@ def yarn_ball(rng: np.random.Generator) -> Parts:
     wobble = rng.uniform(0.02, 0.1)
     ring = np.c_[radius * np.cos(angle), radius * np.sin(angle), wobble * radius * np.sin(3 * angle)]
     loop = sweep(ring, thread, 5, closed=True)
-    count = int(rng.integers(18, 27))
+    count = min(int(rng.integers(18, 27) * max(0.06 * radius / thread, 1.0)), 48)
     turns = [rotation_matrix(*rng.uniform(0, 360, 3)) * rng.uniform(0.94, 1.06) for _ in range(count)]
     strands = copies(loop, np.array(turns), np.zeros((count, 3)))
     s = np.linspace(0, 1, 40)
     way = rng.normal(0, 1.2) * s + 0.6 * np.sin(rng.uniform(3, 9) * s)
     step = rng.uniform(1, 4) * radius / 40
-    tail = np.c_[
-        0.4 * radius + np.cumsum(np.cos(way)) * step, np.cumsum(np.sin(way)) * step, -1.04 * radius + 0 * s
-    ]
+    floor = float(strands.vertices[:, 2].min()) + thread
+    tail = np.c_[0.1 * radius + np.cumsum(np.cos(way)) * step, np.cumsum(np.sin(way)) * step, floor + 0 * s]
     return {"yarn": [strands, sweep(tail, thread, 6)], "yarn_core": [ball(radius * 0.97, 3)]}
 
 
@@ -126,8 +125,8 @@ def thread_spools(rng: np.random.Generator) -> Parts:
         )
         turns = int(rng.integers(14, 26))
         t = np.linspace(0, 1, 13 * turns)
-        wound = rng.uniform(0.65, 0.95) * radius * (1 + 0.04 * np.sin(np.pi * t))
         pitch = (tall - 3 * flange) / turns
+        wound = rng.uniform(0.65, 0.95) * (radius - 0.8 * pitch) * (1 + 0.04 * np.sin(np.pi * t))
         coil = np.c_[
             wound * np.cos(2 * np.pi * turns * t),
             wound * np.sin(2 * np.pi * turns * t),

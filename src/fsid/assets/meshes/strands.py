@@ -72,26 +72,24 @@ def fur(rng: np.random.Generator) -> Parts:
 
 @mesh_family("wig")
 def wig(rng: np.random.Generator) -> Parts:
-    """Hair on a head: long locks that fall, wave or curl from a parting; a stand below."""
+    """Hair on a head: long locks that fall, wave or curl from a parting; a stand below.
+
+    Each runs from near the crown over the head to below its middle, and falls from there.
+    """
     size, count = rng.uniform(0.08, 0.1), int(rng.integers(110, 160))
     d = sunflower(2 * count)[count:]
     long, wavy, turns = rng.uniform(0.08, 0.3), rng.uniform(0, 0.012), rng.uniform(0.5, 2.0)
     u = np.linspace(0, 1, 15)[None, :, None]
-    out = d * (1, 1, 0) / np.maximum(np.hypot(d[:, 0], d[:, 1]), 0.25)[:, None]
-    arc = np.arccos(np.clip(d[:, 2], -1, 1))[:, None, None] + 1.7 * np.minimum(2.4 * u, 1.0)
-    head = (
-        1.03
-        * size
-        * (
-            np.sin(np.minimum(arc, 1.75)) * out[:, None]
-            + np.cos(np.minimum(arc, 1.75)) * np.array((0, 0, 1.2))
-        )
-    )
-    fall = long * u**1.5 * rng.uniform(0.8, 1.1, (count, 1, 1))
+    out = d * (1, 1, 0) / np.hypot(d[:, 0], d[:, 1])[:, None]
+    over, below = np.minimum(2.4 * u, 1.0), np.maximum(2.4 * u - 1.0, 0.0) / 1.4
+    start = 0.55 * np.arccos(d[:, 2])[:, None, None]
+    arc = start + (1.75 - start) * over
+    head = 1.05 * size * (np.sin(arc) * out[:, None] + np.cos(arc) * np.array((0, 0, 1.2)))
+    fall = long * below * rng.uniform(0.8, 1.1, (count, 1, 1))
     phase = rng.uniform(0, 6.3) + rng.normal(0, 0.5, (count, 1, 1))
     sway = (
         wavy
-        * np.clip(u * 2 - 0.5, 0, 1)
+        * np.minimum(1.6 * below, 1.0)
         * np.concatenate(
             [np.cos(6.3 * turns * u + phase), np.sin(6.3 * turns * u + phase), 0 * (u + phase)], axis=-1
         )

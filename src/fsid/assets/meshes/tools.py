@@ -56,7 +56,7 @@ def wrench(rng: np.random.Generator) -> Parts:
     length, deep = rng.uniform(0.12, 0.24), rng.uniform(0.004, 0.008)
     for _ in range(int(rng.integers(1, 5))):
         jaw, bar = length * rng.uniform(0.09, 0.12), length * rng.uniform(0.04, 0.055)
-        shaft = _band(np.linspace(0.3 * jaw, length - 1.1 * jaw, 6), np.full(6, bar / 2), deep * 0.7)
+        shaft = _band(np.linspace(0.6 * jaw, length - 0.6 * jaw, 6), np.full(6, bar / 2), deep * 0.7)
         ring = lathe(
             [
                 (0.55 * jaw, 0),
@@ -78,7 +78,8 @@ def wrench(rng: np.random.Generator) -> Parts:
         ]
         fork = slab(inner, outer, deep, 0.0006).turned(z_deg=rng.uniform(-20, 20))
         one = [shaft.at(z=0.15 * deep), ring, fork.at(x=length)]
-        solids += [part.turned(z_deg=rng.normal(0, 1)).at(y=y) for part in one]
+        turn = rng.normal(0, 1)
+        solids += [part.turned(z_deg=turn).at(y=y) for part in one]
         y += 2.7 * jaw
         length *= rng.uniform(0.75, 0.92)
     return {"metal": solids}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import chain
 
 import numpy as np
@@ -29,9 +30,10 @@ def toy_blocks(rng: np.random.Generator) -> Parts:
     towers: list[list[Solid]] = []
     colours: list[int] = []
     for _ in spots:
-        z, tower = 0.0, []
+        z = 0.0
+        tower: list[Solid] = []
         for _ in range(int(rng.integers(1, 6))):
-            block, tall = _block_rand(rng, size)
+            block, tall = _block_rand(rng, size, arch=not tower)
             dx, dy = rng.normal(0, 0.08, 2) * size
             colours.append(int(rng.integers(3)))
             tower.append(block.turned(z_deg=rng.uniform(0, 360)).at(dx, dy, z))
@@ -78,6 +80,7 @@ def toy_car(rng: np.random.Generator) -> Parts:
     """Car, van or truck: rounded body, cabin with windows, four to six wheels, lamps, bumpers."""
     x, y, z = rng.uniform(0.08, 0.18), rng.uniform(0.04, 0.06), rng.uniform(0.018, 0.03)
     wheel = rng.uniform(0.32, 0.5) * z + 0.004
+    wheel = min(wheel, 0.15 * x)
     truck = rng.random() < 0.35
     nose, tail = rng.uniform(0.05, 0.3), 0.35 if truck else rng.uniform(0.0, 0.25)
     soft = rng.uniform(0.15, 0.45) * z
@@ -103,7 +106,8 @@ def toy_car(rng: np.random.Generator) -> Parts:
     if truck:
         bed = box(tail * x * 0.98, 0.97 * y, rng.uniform(0.4, 1.3) * roof, 0.002, 2)
         body.append(bed.at(0.5 * x * (1 - tail), 0, wheel + z - 0.001))
-    tyres, hubs = _wheels(x * np.array((-0.32, 0.16, 0.36) if truck else (-0.31, 0.31)), y, wheel)
+    axles = (-0.32 * x, 0.36 * x - max(0.2 * x, 2.15 * wheel), 0.36 * x) if truck else (-0.31 * x, 0.31 * x)
+    tyres, hubs = _wheels(axles, y, wheel)
     lamps = [ball(0.12 * z + 0.001, 2).at(-x / 2 + 0.001, s * 0.34 * y, wheel + 0.55 * z) for s in (-1, 1)]
     bumpers = [box(0.006, 0.96 * y, 0.2 * z, 0.0015).at(s * x / 2, 0, wheel + 0.1 * z) for s in (-1, 1)]
     return {
@@ -145,15 +149,18 @@ def gears(rng: np.random.Generator) -> Parts:
     return {"metal_gears": wheels, "axles": axles, "base": [base]}
 
 
-def _block_rand(rng: np.random.Generator, size: float) -> tuple[Solid, float]:
-    """A block and the height of its flat top; 0 where nothing can stand on it."""
+def _block_rand(rng: np.random.Generator, size: float, *, arch: bool) -> tuple[Solid, float]:
+    """A block and the height of its flat top; 0 where nothing can stand on it.
+
+    arch: whether it may be one, whose feet would stand beside most blocks.
+    """
     kind = rng.random()
     tall = size * float(rng.choice((0.5, 1.0, 1.5)))
     if kind < 0.5:
         return box(size * float(rng.choice((1, 1, 2, 3))), size, tall, 0.003), tall
     if kind < 0.7:
         return cylinder(size / 2, tall, 0.003, 24), tall
-    if kind < 0.85:
+    if kind < 0.85 and arch:
         a = np.linspace(0, np.pi, 16)
         inner = np.c_[0.6 * size * np.cos(a), 0.6 * size * np.sin(a)]
         outer = np.c_[
@@ -161,15 +168,17 @@ def _block_rand(rng: np.random.Generator, size: float) -> tuple[Solid, float]:
             1.05 * size * np.minimum(1, 1.6 * np.sin(a)),
         ]
         return slab(inner, outer, size, 0.0015).turned(x_deg=90).at(y=size / 2), 1.05 * size
+    if kind < 0.85:
+        return box(2 * size, 0.5 * size, tall, 0.003), tall
     return cone(size / 2, 0.05 * size, tall, 0.002, 24), 0.0
 
 
-def _wheels(axles: np.ndarray, track: float, radius: float) -> tuple[list[Solid], list[Solid]]:
+def _wheels(axles: Sequence[float], track: float, radius: float) -> tuple[list[Solid], list[Solid]]:
     """Tyres and hubs of a vehicle on z = 0 with its axles at these x."""
     tyre = cylinder(radius, 0.009, 0.0025, 28).warped(fluted(28, 0.05, 0.0)).at(z=-0.0045).turned(x_deg=90)
     dish = [(0, 0), (0.6 * radius, 0), (0.5 * radius, 0.002), (0.2 * radius, 0.001), (0, 0.0025)]
     hub = lathe(dish, 20)
-    places = [(float(x), s) for x in axles for s in (-1, 1)]
+    places = [(x, s) for x in axles for s in (-1, 1)]
     tyres = [tyre.at(x, s * (track / 2 - 0.001), radius) for x, s in places]
     return tyres, [hub.turned(x_deg=-90 * s).at(x, s * (track / 2 + 0.003), radius) for x, s in places]
 

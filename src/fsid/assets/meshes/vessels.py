@@ -22,22 +22,33 @@ def vase(rng: np.random.Generator) -> Parts:
     outer = radius * PchipInterpolator(np.linspace(0, 1, 5), knots)(t)
     if rng.random() < 0.4:
         outer *= 1 + rng.uniform(0.01, 0.04) * np.cos(2 * np.pi * int(rng.integers(4, 11)) * t)
-    body = hollow(outer, t * height, rng.uniform(0.003, 0.007))
-    style = rng.random()
-    if style < 0.25:
-        body = body.warped(squared(rng.uniform(2.4, 6)))
-    elif style < 0.6:
-        body = body.warped(fluted(int(rng.integers(4, 13)), rng.uniform(0.02, 0.09), rng.normal(0, 9)))
+    wall, style = rng.uniform(0.003, 0.007), rng.random()
+    body, sides = hollow(outer, t * height, wall), [np.c_[s * outer, 0 * t, t * height] for s in (1, -1)]
+    if style < 0.6:
+        warp = (
+            squared(rng.uniform(2.4, 6))
+            if style < 0.25
+            else fluted(int(rng.integers(4, 13)), rng.uniform(0.02, 0.09), rng.normal(0, 9))
+        )
+        body, sides = body.warped(warp), [warp(side) for side in sides]
     parts = {"body": [body]}
     if rng.random() < 0.25:
         s = np.linspace(0, np.pi, 20)
         low, high = height * rng.uniform(0.3, 0.5), height * rng.uniform(0.7, 0.9)
-        start, end = (np.interp(z, t * height, outer) * 0.95 for z in (low, high))
-        x = start + (end - start) * (1 - np.cos(s)) / 2 + radius * rng.uniform(0.3, 0.7) * np.sin(s)
-        path = np.c_[x, 0 * s, low + (high - low) * (1 - np.cos(s)) / 2]
-        ear = sweep(path, rng.uniform(0.004, 0.009), 10)
-        parts["handles"] = [ear, ear.turned(z_deg=180)]
+        out, thick = radius * rng.uniform(0.3, 0.7) * np.sin(s), rng.uniform(0.004, 0.009)
+        ears = [_ear(np.abs(side[:, 0]) - 0.7 * wall, t * height, low, high, out, thick) for side in sides]
+        parts["handles"] = [ears[0], ears[1].turned(z_deg=180)]
     return parts
+
+
+def _ear(within: np.ndarray, z: np.ndarray, low: float, high: float, out: np.ndarray, thick: float) -> Solid:
+    """Handle from `low` to `high`, `out` (n,) off the wall, that ends in it: at radii `within` at `z`."""
+    start, end = np.interp((low, high), z, within)
+    share = np.linspace(0, np.pi, len(out))
+    share = (1 - np.cos(share)) / 2
+    ear = sweep(np.c_[start + (end - start) * share + out, 0 * out, low + (high - low) * share], thick, 10)
+    x, y, height = ear.vertices.T
+    return Solid(np.c_[np.maximum(x, np.interp(height, z, within)), y, height], ear.normals, ear.faces)
 
 
 @mesh_family("bottle")
