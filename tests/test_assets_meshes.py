@@ -202,6 +202,9 @@ HEAPS = {
     "polyhedron": ("glass_gem", "stone"),
     "seashells": ("ceramic_spirals", "ceramic_fans"),
     "springs": ("metal",),
+    "vegetables": ("peel",),
+    "towels": ("cloth", "cloth_other"),
+    "toy_car": ("rubber_tyres",),
 }
 """Families of bodies that are beside or on each other, and the parts that are such bodies."""
 
@@ -233,30 +236,56 @@ def points_on(solid: Solid, step: float) -> np.ndarray:
     return np.concatenate(points)
 
 
-@pytest.mark.parametrize(
-    "family", ["armchair", "bench", "office_chair", "parcel", "pendant_lamp", "scissors"]
-)
-def test_all_of_a_thing_hangs_together(family):
-    """From any of its solids a path of solids that touch leads to any other: nothing is held by nothing."""
-    for seed in (1, 2, 6):
-        solids = [s for group in solids_of(family, seed).values() for s in group]
-        step = 0.008 * float(np.ptp(np.concatenate([s.vertices for s in solids]), axis=0).max())
-        clouds = [points_on(s, step) for s in solids]
-        lows, highs = (np.array([fn(s.vertices, axis=0) for s in solids]) for fn in (np.min, np.max))
-        reached, waiting = {0}, [0]
+def groups_that_touch(solids: list[Solid]) -> list[set[int]]:
+    """Numbers of solids: from each of a group a path of solids that touch leads to all of it."""
+    step = 0.008 * float(np.ptp(np.concatenate([s.vertices for s in solids]), axis=0).max())
+    clouds = [points_on(s, step) for s in solids]
+    lows, highs = (np.array([fn(s.vertices, axis=0) for s in solids]) for fn in (np.min, np.max))
+    left, groups = set(range(len(solids))), []
+    while left:
+        group = {left.pop()}
+        waiting = list(group)
         while waiting:
             one = waiting.pop()
             tree = cKDTree(clouds[one])
-            for other in set(range(len(solids))) - reached:
+            for other in left - group:
                 low, high = (
                     np.maximum(lows[one], lows[other]) - step,
                     np.minimum(highs[one], highs[other]) + step,
                 )
                 near = clouds[other][((clouds[other] > low) & (clouds[other] < high)).all(1)]
                 if len(near) and tree.query(near, distance_upper_bound=step)[0].min() < step:
-                    reached.add(other)
+                    group.add(other)
                     waiting.append(other)
-        assert len(reached) == len(solids), (family, seed)
+        left -= group
+        groups.append(group)
+    return groups
+
+
+def flat(parts: dict[str, list[Solid]]) -> list[Solid]:
+    return [solid for group in parts.values() for solid in group]
+
+
+def lowest(solids: list[Solid]) -> float:
+    return min(float(solid.vertices[:, 2].min()) for solid in solids)
+
+
+@pytest.mark.parametrize(
+    "family", ["armchair", "bench", "office_chair", "parcel", "pendant_lamp", "scissors"]
+)
+def test_all_of_a_thing_hangs_together(family):
+    """From any of its solids a path of solids that touch leads to any other: nothing is held by nothing."""
+    for seed in (1, 2, 6):
+        assert len(groups_that_touch(flat(solids_of(family, seed)))) == 1, (family, seed)
+
+
+@pytest.mark.parametrize("family", ["towels", "toy_blocks"])
+def test_what_is_piled_up_lies_on_what_is_below(family):
+    """Everything that touches reaches down to the floor."""
+    for seed in range(8):
+        solids = flat(solids_of(family, seed))
+        for group in groups_that_touch(solids):
+            assert lowest([solids[k] for k in group]) < lowest(solids) + 1e-3, (family, seed)
 
 
 def extent(solid: Solid) -> np.ndarray:
@@ -408,6 +437,87 @@ def test_teeth_of_gears_meet_gaps():
             inside = np.interp(at, known, outline[known], period=720) - np.hypot(*other.T)
             tooth = reach.max() - outline[known].min()
             assert inside.max() < 0.25 * tooth, (seed, k)
+
+
+def test_a_spanner_is_one_piece_and_its_ring_is_open():
+    for seed in range(8):
+        metal = solids_of("wrench", seed)["metal"]
+        shafts, rings = metal[::3], metal[1::3]
+        assert len(groups_that_touch(metal)) == len(rings), seed
+        for shaft, ring in zip(shafts, rings, strict=True):
+            middle = (ring.vertices[:, :2].min(0) + ring.vertices[:, :2].max(0)) / 2
+            hole = np.hypot(*(ring.vertices[:, :2] - middle).T).min()
+            assert np.hypot(*(shaft.vertices[:, :2] - middle).T).min() > hole
+
+
+def test_an_open_umbrella_lies_on_two_ribs_and_its_handle():
+    for seed in range(8):
+        parts = solids_of("umbrella", seed)
+        ribs, handle = parts["metal_ribs"][0].vertices, parts["wood_handle"]
+        canopy = [*parts["cloth_panels"], *parts["cloth_other"], parts["metal_ribs"][0]]
+        assert lowest(canopy) == pytest.approx(lowest(handle), abs=1e-4)
+        low = ribs[ribs[:, 2] < lowest(canopy) + 0.01, 1]
+        assert low.min() < -0.1
+        assert low.max() > 0.1
+
+
+def test_ears_of_a_vase_end_in_its_wall():
+    """They do not come through it: in the plane of the ears none of it is nearer to the middle."""
+    eared = 0
+    for seed in range(24):
+        parts = solids_of("vase", seed)
+        body = parts["body"][0]
+        for ear, side in zip(parts.get("handles", []), (1, -1), strict=False):
+            eared += 1
+            plane = (np.abs(body.vertices[:, 1]) < 1e-6) & (side * body.vertices[:, 0] > 0)
+            points, facing = side * body.vertices[plane], side * body.normals[plane, 0]
+            height, radius = np.abs(body.vertices[plane, 2]), points[:, 0]
+            inner, outer = (
+                np.c_[height[k], radius[k]][np.argsort(height[k])]
+                for k in ((facing < -0.2) & (height > 0.02), facing > 0.2)
+            )
+            x, z = side * ear.vertices[:, 0], ear.vertices[:, 2]
+            assert (x > np.interp(z, *inner.T)).all(), seed
+            assert (x < np.interp(z, *outer.T)).any(), seed
+    assert eared
+
+
+def test_the_head_under_a_wig_is_under_it():
+    """No lock goes into it, and hair is near all of its upper third."""
+    for seed in range(6):
+        parts = solids_of("wig", seed)
+        hair, head = parts["yarn_hair"][0].vertices, parts["head"][0].vertices
+        locks = hair.reshape(-1, 4, 3).mean(1)
+        size = np.ptp(head, axis=0) / 2
+        assert np.linalg.norm(locks / size, axis=1).min() > 0.95
+        upper = head[head[:, 2] > size[2] / 3]
+        assert np.mean(cKDTree(hair).query(upper)[0] < 0.1 * size[0]) > 0.95
+
+
+def test_yarn_is_wound_around_its_ball_and_its_end_lies_on_the_floor():
+    for seed in range(12):
+        parts = solids_of("yarn_ball", seed)
+        (strands, tail), (core,) = parts["yarn"], parts["yarn_core"]
+        assert lowest([tail]) == pytest.approx(lowest([strands]), abs=1e-3)
+        points = points_on(strands, 0.004)
+        ways = points / np.linalg.norm(points, axis=1, keepdims=True)
+        bare = core.vertices / np.linalg.norm(core.vertices, axis=1, keepdims=True)
+        assert np.mean(cKDTree(ways).query(bare)[0] < 0.1) > 0.96, seed
+
+
+def test_a_spool_lies_on_its_flanges():
+    """Not on the thread, which is wound less high."""
+    for seed in range(12):
+        parts = solids_of("thread_spools", seed)
+        assert lowest(parts["yarn"]) > lowest(parts["reels"]) + 2e-4
+
+
+def test_the_block_of_a_landscape_meets_its_surface():
+    """Its upper edge is nowhere farther below the surface than the sheet of the surface is thick."""
+    for seed in range(4):
+        surface, block = solids_of("terrain", seed)["soil"]
+        upper = block.vertices[block.vertices[:, 2] > 1e-6]
+        assert cKDTree(surface.vertices).query(upper)[0].max() < 1e-3, seed
 
 
 def test_the_tip_of_a_banana_can_be_seen():

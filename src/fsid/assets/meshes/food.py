@@ -57,14 +57,17 @@ def vegetables(rng: np.random.Generator) -> Parts:
     length, thick = rng.uniform(0.1, 0.22), rng.uniform(0.012, 0.035)
     taper, rough = rng.uniform(0.0, 0.9), rng.uniform(0.0, 0.05)
     s = np.linspace(0, 1, 40)
-    bodies, greens = [], []
-    for k in range(int(rng.integers(1, 6))):
+    bodies, greens, beside = [], [], 0.0
+    for _ in range(int(rng.integers(1, 6))):
         shape = np.clip(np.minimum(s * 10, (1 - s) * 6), 0.05, 1) ** 0.5 * (1 - taper * s)
         radius = thick * rng.uniform(0.8, 1.1) * (shape + rough * rng.normal(0, 0.6, 40))
         bow = rng.normal(0, 0.12) * length
-        path = np.c_[length * s, bow * np.sin(np.pi * s), 0 * s]
-        turn, y = rng.normal(0, 9), 2.15 * thick * (k - 2)
-        bodies.append(sweep(path, np.maximum(radius, 0.0008), 16).turned(z_deg=turn).resting().at(y=y))
+        path = np.c_[length * s, bow * np.sin(np.pi * s), thick * (1 - taper * s)]
+        turn = rng.normal(0, 9)
+        body = sweep(path, np.maximum(radius, 0.0008), 16).turned(z_deg=turn).resting()
+        y = beside - float(body.vertices[:, 1].min())
+        beside = y + float(body.vertices[:, 1].max()) + 0.001
+        bodies.append(body.at(y=y))
         fan = np.linspace(0, 1, 7)[:, None]
         for _ in range(5):
             aim = rng.normal(0, (0.35, 0.35, 0.1), 3) - (1, 0, -0.15)

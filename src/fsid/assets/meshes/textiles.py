@@ -136,9 +136,12 @@ def _fringe_rand(
 
 @mesh_family("towels")
 def towels(rng: np.random.Generator) -> Parts:
-    """Folded towels in a pile, or rolled: soft layers with visible folds."""
+    """Folded towels in a pile, or rolled: soft layers with visible folds.
+
+    A roll ends its pile: nothing would lie on it, and the next towel begins a pile beside it.
+    """
     x, y = rng.uniform(0.18, 0.35), rng.uniform(0.14, 0.28)
-    parts: tuple[list[Solid], ...] = ([], [])
+    piles: list[list[tuple[int, Solid]]] = [[]]
     z = 0.0
     for k in range(int(rng.integers(1, 6))):
         thick = rng.uniform(0.007, 0.018)
@@ -146,10 +149,10 @@ def towels(rng: np.random.Generator) -> Parts:
             turns = rng.uniform(2.5, 4)
             a = np.linspace(0.6, turns * 2 * np.pi, 90)
             r = 0.009 + thick * 1.12 * a / (2 * np.pi)
-            outer = float(r[-1] + thick / 2)
-            roll = _ribbon(np.c_[r * np.cos(a), r * np.sin(a)], x, thick)
-            parts[k % 2].append(roll.turned(z_deg=rng.normal(0, 5)).at(z=z + outer))
-            z += 1.6 * outer
+            roll = _ribbon(np.c_[r * np.cos(a), r * np.sin(a)], x, thick).turned(z_deg=rng.normal(0, 5))
+            piles[-1].append((k % 2, roll.resting(z)))
+            piles.append([])
+            z = 0.0
             continue
         layers = int(rng.integers(2, 6))
         pitch = 1.12 * thick
@@ -165,8 +168,16 @@ def towels(rng: np.random.Generator) -> Parts:
                     np.c_[way * (y / 2 + pitch / 2 * np.cos(bend)), (m + 0.5 + 0.5 * np.sin(bend)) * pitch]
                 )
         folded = _ribbon(np.vstack(line), x * rng.uniform(0.9, 1.05), thick).turned(z_deg=rng.normal(0, 4))
-        parts[k % 2].append(folded.resting(z).at(*rng.normal(0, 0.006, 2)))
-        z += layers * pitch + 0.002
+        folded = folded.resting(z).at(*rng.normal(0, 0.006, 2))
+        piles[-1].append((k % 2, folded))
+        z = float(folded.vertices[:, 2].max())
+    parts: tuple[list[Solid], ...] = ([], [])
+    edge = 0.0
+    for pile in piles:
+        y_in_pile = np.concatenate([towel.vertices[:, 1] for _, towel in pile] or [np.zeros(1)])
+        for colour, towel in pile:
+            parts[colour].append(towel.at(y=edge - float(y_in_pile.min())))
+        edge += float(np.ptp(y_in_pile)) + 0.004
     named = zip(("cloth", "cloth_other"), parts, strict=True)
     return {name: solids for name, solids in named if solids}
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.optimize import brentq
 
 from fsid.assets.forms import loft, plate, slab
 from fsid.assets.registry import Parts, mesh_family
-from fsid.assets.solids import Solid, box, cylinder, lathe, rotation_matrix, sheet, sweep, tubes
+from fsid.assets.solids import Solid, box, cylinder, join, lathe, rotation_matrix, sheet, sweep, tubes
 
 
 @mesh_family("shoe")
@@ -171,34 +172,47 @@ def spectacles(rng: np.random.Generator) -> Parts:
 
 @mesh_family("umbrella")
 def umbrella(rng: np.random.Generator) -> Parts:
-    """Open umbrella or parasol: panels that sag between their ribs, shaft, hooked handle."""
+    """Open umbrella or parasol: panels that sag between their ribs, shaft, hooked handle.
+
+    It lies on the tips of two ribs and its handle, as open ones lie.
+    """
     radius, ribs = rng.uniform(0.35, 0.6), int(rng.integers(6, 11))
     rise, sag = rng.uniform(0.18, 0.4) * radius, rng.uniform(0.03, 0.09)
     s = np.linspace(0.02, 1, 11)[:, None]
     a = np.linspace(0, 2 * np.pi, 8 * ribs + 1)[None]
-    between = np.abs(np.sin(ribs * a / 2))
-    r = radius * s * (1 - 0.09 * between**1.5 * s)
+    way, between = a + np.pi / ribs, np.abs(np.sin(ribs * a / 2))
+    hem = max(0.09, 1.3 * (1 - np.cos(np.pi / ribs)))
+    r = radius * s * (1 - hem * between**1.5 * s)
     z = rise * (1 - s**2) - sag * radius * between * s**1.5 * (1.1 - s)
-    points = np.stack(np.broadcast_arrays(r * np.cos(a), r * np.sin(a), z), axis=-1)
+    points = np.stack(np.broadcast_arrays(r * np.cos(way), r * np.sin(way), z), axis=-1)
     colour = np.arange(ribs) % 2
     panels: tuple[list[Solid], ...] = ([], [])
     for k in range(ribs):
         panels[colour[k]].append(sheet(points[:, 8 * k : 8 * k + 9], 0.0012))
     spoke = np.linspace(0.03, 1.0, 8)
     line = np.stack([radius * spoke, 0 * spoke, rise * (1 - spoke**2) - 0.003], axis=1)
-    spokes = tubes(np.array([line @ rotation_matrix(z_deg=360 * k / ribs).T for k in range(ribs)]), 0.0018, 6)
+    spokes = tubes(
+        np.array([line @ rotation_matrix(z_deg=360 * (k + 0.5) / ribs).T for k in range(ribs)]), 0.0018, 6
+    )
     length = radius * rng.uniform(1.2, 1.6)
     shaft = cylinder(0.005, length + rise + 0.03, 0.002, 12).at(z=-length)
     t = np.linspace(0, np.pi * 1.15, 16)
     hook = np.c_[0.035 * (1 - np.cos(t)), 0 * t, -length - 0.035 * np.sin(t)]
     grip = sweep(np.vstack([(0, 0, -length + 0.09), (0, 0, -length + 0.03), hook]), 0.0085, 10)
+    grip = grip.turned(z_deg=rng.uniform(-90, 90))
     parts = {
         "cloth_panels": panels[0],
         "cloth_other": panels[1],
         "metal_ribs": [spokes, shaft],
         "wood_handle": [grip],
     }
-    lean = rng.uniform(0, 70)
+    canopy = join([*panels[0], *panels[1], spokes])
+
+    def above_deg(lean: float) -> float:
+        rim, end = (float(part.turned(y_deg=lean).vertices[:, 2].min()) for part in (canopy, grip))
+        return rim - end
+
+    lean = brentq(above_deg, 0, 90)
     return {name: [p.turned(y_deg=lean) for p in solids] for name, solids in parts.items()}
 
 
