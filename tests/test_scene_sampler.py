@@ -241,6 +241,49 @@ def test_copies_look_alike_and_lie_near_the_first_of_their_kind():
     assert np.mean(ratios) < 0.8
 
 
+def test_copies_of_what_is_large_and_far_stand_beside_each_other():
+    """In crowds of them too, hardly one has its middle within a quarter of its size from the next one's."""
+    outdoors = BackgroundConfig(kind_shares=(0, 0, 0, 1))
+    far = PlacementConfig(far_share=0.6, size_m=(0.4, 0.8))
+    config = dataclasses.replace(
+        CONFIG,
+        objects=(80, 80),
+        repeat_share=0.8,
+        mesh_families=("dice",),
+        background=outdoors,
+        placement=far,
+    )
+    gaps = []
+    for seed in SEEDS:
+        s = scene(seed, config=config)
+        extents = boxes(s)
+        middles, sizes = extents.mean(1), np.ptp(extents, axis=1).max(1)
+        for k, kind in enumerate(s.objects):
+            twins = [i for i in range(k) if s.objects[i] == kind]
+            if twins and sizes[k] > 2.5:
+                gap = np.linalg.norm(middles[twins] - middles[k], axis=1) / (sizes[twins] + sizes[k]) * 2
+                gaps.append(gap.min())
+    assert len(gaps) > 80
+    assert np.mean(np.array(gaps) < 0.25) < 0.3
+
+
+def test_a_large_copy_is_no_longer_in_x_than_a_small_one():
+    """A copy's size and its stretch are drawn apart."""
+    config = dataclasses.replace(CONFIG, mesh_families=("dice",), nature_share=0.0, repeat_share=0.9)
+    sizes, stretches = [], []
+    for seed in SEEDS:
+        s = scene(seed, config=config)
+        first = {
+            o: np.array(t.scale) for o, t in zip(reversed(s.objects), reversed(s.transforms), strict=True)
+        }
+        for o, t in zip(s.objects, s.transforms, strict=True):
+            logs = np.log(np.array(t.scale))
+            sizes.append(logs.max() - np.log(first[o].max()))
+            stretches.append(logs[0] - logs.mean())
+    assert len(sizes) > 300
+    assert abs(np.corrcoef(sizes, stretches)[0, 1]) < 0.2
+
+
 def test_a_new_family_changes_only_the_draws_that_it_wins(monkeypatch):
     """Seeds keep their scenes from release to release, but for what is new in them."""
     before = [scene(seed) for seed in SEEDS]

@@ -36,6 +36,8 @@ _PILE_LIMIT_M = 0.6
 """Things come to rest on others whose top is lower than this."""
 _FAR_ANGLE = 0.7
 """Radians to either side of the camera's direction within which the far objects lie."""
+_BESIDE = 0.75
+"""Copies of what is large and far lie within this part of its distance from the focus."""
 _SINK = 0.01
 """Part of its size by which a resting object sinks in: contact has no gap."""
 
@@ -67,6 +69,7 @@ class _Draw(NamedTuple):
     stretch: np.ndarray
     floating: bool
     spots: np.ndarray
+    likeness: float
 
 
 def scattered(
@@ -126,7 +129,8 @@ def _draw_rand(
     spots = np.c_[focus_m[0] + rho * np.cos(phi), focus_m[1] + rho * np.sin(phi), z]
     if rng.random() < config.upright_share and not floating:
         turn_deg[:2] = 0.0
-    return _Draw(turn_deg, size_m, stretch, bool(floating), np.clip(spots, space.low, space.high))
+    spots, likeness = np.clip(spots, space.low, space.high), log_uniform_rand(rng, config.stretch)
+    return _Draw(turn_deg, size_m, stretch, bool(floating), spots, likeness)
 
 
 def _beside(
@@ -137,10 +141,16 @@ def _beside(
     space: Space,
     config: PlacementConfig,
 ) -> _Draw:
-    """The draw of a copy: nearly as large as the first of its kind at `place_m`, about three sizes away."""
-    away = (draw.spots - focus_m) * min(3 * size_m / config.spread_m, 1.0)
+    """The draw of a copy: nearly as large as the first of its kind at `place_m`, up to three sizes from it.
+
+    But no farther than was drawn or than a part of its distance, so that what is large and far stays far.
+    """
+    drawn = draw.spots - focus_m
+    drawn_m = np.linalg.norm(drawn, axis=1, keepdims=True)
+    room_m = np.maximum(drawn_m, _BESIDE * np.linalg.norm(place_m - focus_m))
+    away = drawn * np.minimum(3 * size_m / config.spread_m, room_m / drawn_m)
     spots = np.clip(place_m + away, space.low, space.high)
-    return draw._replace(size_m=size_m * float(draw.stretch[0]), spots=spots)
+    return draw._replace(size_m=size_m * draw.likeness, spots=spots)
 
 
 def _crowding(
