@@ -44,11 +44,16 @@ def vase(rng: np.random.Generator) -> Parts:
 def _ear(within: np.ndarray, z: np.ndarray, low: float, high: float, out: np.ndarray, thick: float) -> Solid:
     """Handle from `low` to `high`, `out` (n,) off the wall, that ends in it: at radii `within` at `z`."""
     start, end = np.interp((low, high), z, within)
-    share = np.linspace(0, np.pi, len(out))
-    share = (1 - np.cos(share)) / 2
-    ear = sweep(np.c_[start + (end - start) * share + out, 0 * out, low + (high - low) * share], thick, 10)
-    x, y, height = ear.vertices.T
-    return Solid(np.c_[np.maximum(x, np.interp(height, z, within)), y, height], ear.normals, ear.faces)
+    share = (1 - np.cos(np.linspace(0, np.pi, len(out)))) / 2
+    path = np.c_[start + (end - start) * share + out, 0 * out, low + (high - low) * share]
+    return _ending_in_wall(sweep(path, thick, 10), within, z)
+
+
+def _ending_in_wall(handle: Solid, within: np.ndarray, z: np.ndarray) -> Solid:
+    """`handle`, at x > 0, with flat ends where they would come through: at radii `within` at `z`."""
+    x, y, height = handle.vertices.T
+    flat = np.c_[np.maximum(x, np.interp(height, z, within)), y, height]
+    return Solid(flat, handle.normals, handle.faces)
 
 
 @mesh_family("bottle")
@@ -179,6 +184,7 @@ def mug(rng: np.random.Generator) -> Parts:
     handle = sweep(
         np.c_[x, np.zeros(24), middle + grip * np.sin(turn)], rng.uniform(0.003, 0.006), 12
     ).stretched(1, rng.uniform(1, 1.8), 1)
+    handle = _ending_in_wall(handle, outer - 0.7 * wall, t * height)
     parts = {"ceramic_cup": [hollow(outer, t * height, wall)], "ceramic_handle": [handle]}
     if rng.random() < 0.4:
         level = rng.uniform(0.6, 0.9) * height
