@@ -38,19 +38,24 @@ def tables(rng: np.random.Generator, variant: int, size: int) -> Layers:
     for i in range(blocks):
         for j in range(blocks):
             box = (i * step + 0.03 * step, j * step + 0.04 * step, (i + 0.97) * step, (j + 0.96) * step)
-            _table(branch(rng), draw, tint_draw, box, wide * rng.uniform(0.009, 0.022))
+            own, points = branch(rng), wide * rng.uniform(0.009, 0.022)
+            _table(own, size, (draw, tint_draw), box, points)
     return _sheet(rng, size, averaged(image), 0.9 * averaged(tint))
 
 
 def _table(
-    rng: np.random.Generator, draw: ImageDraw.ImageDraw, tint: ImageDraw.ImageDraw, box: Box, points: float
+    rng: np.random.Generator,
+    size: int,
+    sheets: tuple[ImageDraw.ImageDraw, ImageDraw.ImageDraw],
+    box: Box,
+    points: float,
 ) -> None:
+    draw, tint = sheets
     left, top, right, bottom = box
     ends = left + (right - left) * np.r_[0, np.cumsum(rng.dirichlet(np.full(rng.integers(3, 9), 4.0)))]
     row_height = points * rng.uniform(1.3, 2.0)
     rows = int((bottom - top) / row_height)
     rule, script = int(rng.integers(1, 4)), script_rand(rng)
-    size = draw.im.size[0] // 2
     face = font_rand(rng, script, points)
     digits = font_rand(rng, "digits", points)
     worded = rng.random(len(ends)) < 0.35
