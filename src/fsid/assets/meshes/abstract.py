@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from fsid.assets.forms import loft, plate, spread, turns_to
+from fsid.assets.heap import Heap
 from fsid.assets.registry import Parts, mesh_family
 from fsid.assets.solids import (
     Solid,
@@ -98,12 +99,13 @@ def sweep_family(rng: np.random.Generator) -> Parts:
 def sheet_stack(rng: np.random.Generator) -> Parts:
     """Dead leaves: curled papers of three sorts, square, round or torn, scattered over each other."""
     parts: tuple[list[Solid], ...] = ([], [], [])
-    size, n = rng.uniform(0.1, 0.3), 9
-    height = 0.0
+    size, n, thick = rng.uniform(0.1, 0.3), 9, 0.0007
+    heap = Heap(2.5 * size, size / 18)
+    flat = np.meshgrid(np.linspace(-1, 1, n), np.linspace(-1, 1, n))
     for count in rng.integers(2, 9, 3):
         grids = []
         for _ in range(count):
-            u, v = np.meshgrid(np.linspace(-1, 1, n), np.linspace(-1, 1, n))
+            u, v = flat
             if rng.random() < 0.4:
                 u, v = u * np.sqrt(1 - v * v / 2), v * np.sqrt(1 - u * u / 2)
             x, y = size * rng.uniform(0.3, 1), size * rng.uniform(0.3, 1.3)
@@ -115,12 +117,10 @@ def sheet_stack(rng: np.random.Generator) -> Parts:
                 + 0.004 * np.sin(rng.normal(0, 3) * u + 3 * v)
             )
             tilt = rotation_matrix(rng.normal(0, 4), rng.normal(0, 4), rng.uniform(0, 360))
-            place = (*rng.normal(0, 0.35 * size, 2), height)
-            grids.append(
-                np.stack([u * x / 2, v * y / 2, z - 0.3 * z.min()], axis=-1) @ tilt.T + np.array(place)
-            )
-            height += 0.0035
-        parts[int(rng.integers(3))].append(sheets(np.array(grids), 0.0007))
+            place = (*rng.normal(0, 0.35 * size, 2), 0.0)
+            paper = np.stack([u * x / 2, v * y / 2, z], axis=-1) @ tilt.T + np.array(place)
+            grids.append(heap.drape(paper, 1.6 * thick))
+        parts[int(rng.integers(3))].append(sheets(np.array(grids), thick))
     named = zip(("paper", "paper_second", "paper_third"), parts, strict=True)
     return {name: solids for name, solids in named if solids}
 

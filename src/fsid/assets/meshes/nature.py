@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fsid.assets.forms import loft, scatter_rand, spread, sunflower, turns_to
+from fsid.assets.heap import Heap, leant, middle_points
 from fsid.assets.meshes.plants import leaf_rand
 from fsid.assets.registry import Parts, mesh_family
 from fsid.assets.solids import (
@@ -146,9 +147,10 @@ def logs(rng: np.random.Generator) -> Parts:
 @mesh_family("fallen_leaves")
 def fallen_leaves(rng: np.random.Generator) -> Parts:
     """Dry leaves of two sorts, curled, in a heap."""
-    parts = {}
     size = rng.uniform(0.04, 0.1)
-    for name in ("leaf", "leaf_other"):
+    thick = max(0.0008, 0.006 * size)
+    sorts, points, order = [], [], []
+    for _ in range(2):
         leaf = leaf_rand(rng, int(rng.choice((1, 2, 3, 4, 6))), size)
         roll = rng.uniform(2, 9)
 
@@ -158,15 +160,18 @@ def fallen_leaves(rng: np.random.Generator) -> Parts:
 
         curled = leaf.warped(curl)
         count = int(rng.integers(6, 22))
-        turns = [
-            rotation_matrix(rng.normal(0, 35) + 180 * rng.integers(2), rng.normal(0, 20), rng.uniform(0, 360))
-            * rng.uniform(0.6, 1.2)
-            for _ in range(count)
-        ]
-        spots = rng.normal(0, 0.9 * size, (count, 2))
-        high = rng.uniform(0, 0.35, count) * size * np.exp(-((np.hypot(*spots.T) / size) ** 2) / 2)
-        parts[name] = [copies(curled, np.array(turns), np.c_[spots, high])]
-    return parts
+        sides = np.outer(rng.choice((-1.0, 1.0), count), (0, 0, 1))
+        turns = turns_to(sides, rng.uniform(0, 6.3, count)) * rng.uniform(0.6, 1.2, (count, 1, 1))
+        spots = np.c_[rng.normal(0, 0.9 * size, (count, 2)), np.zeros(count)]
+        order.append(rng.random(count))
+        sorts.append(copies(curled, turns, spots))
+        points.extend(turns @ middle_points(curled, thick, 3) + spots[:, :, None])
+    heap = Heap(max(float(np.abs(p[:2]).max()) for p in points), size / 24)
+    planes = np.zeros((len(points), 3))
+    for k in np.argsort(np.concatenate(order)):
+        planes[k] = heap.lay(points[k], 1.6 * thick)
+    first = len(order[0])
+    return {"leaf": [leant(sorts[0], planes[:first])], "leaf_other": [leant(sorts[1], planes[first:])]}
 
 
 @mesh_family("feathers")

@@ -7,6 +7,7 @@ from itertools import chain
 import numpy as np
 
 from fsid.assets.forms import plate, scatter_rand, slab, spread
+from fsid.assets.heap import Heap, leant
 from fsid.assets.registry import Parts, mesh_family
 from fsid.assets.solids import (
     Solid,
@@ -49,27 +50,26 @@ def banknotes(rng: np.random.Generator) -> Parts:
     style, count = int(rng.integers(3)), int(rng.integers(2, 9))
     notes: tuple[list[Solid], ...] = ([], [])
     u, v = np.meshgrid(np.linspace(-1, 1, 18), np.linspace(-1, 1, 9))
+    heap, thick = Heap(2.2 * x, 0.004), 0.0002
     for k in range(count):
         wave = sum(
             rng.normal(0, 0.0025) * np.sin(u * rng.normal(0, 3) + v * rng.normal(0, 3)) for _ in range(4)
         )
         fold = rng.uniform(0, 0.25) * np.abs(u) * x / 2 * (style == 1) * (rng.random() < 0.5)
         z = (wave + fold) * (1.0 if style else 0.3)
-        note = sheet(np.stack([u * x / 2, v * y / 2, z - z.min()], axis=-1), 0.0002)
+        note = np.stack([u * x / 2, v * y / 2, z], axis=-1)
         if style == 0:
             turn = rng.uniform(6, 14) * (k - count / 2)
-            note = note.at(0, 0.8 * x).turned(z_deg=turn)
+            note = (note + np.array((0, 0.8 * x, 0))) @ rotation_matrix(z_deg=turn).T
         else:
-            note = note.turned(
-                rng.normal(0, 3), rng.normal(0, 3), rng.uniform(0, 360) if style == 1 else rng.normal(0, 6)
-            )
-            note = note.at(*rng.normal(0, 0.3 * x * (style == 1), 2))
-        notes[int(rng.integers(2))].append(note.at(z=0.0025 * k + 0.001))
+            tilt = rng.normal(0, 3), rng.normal(0, 3), rng.uniform(0, 360) if style == 1 else rng.normal(0, 6)
+            note = note @ rotation_matrix(*tilt).T + (*rng.normal(0, 0.3 * x * (style == 1), 2), 0)
+        notes[int(rng.integers(2))].append(sheet(heap.drape(note, thick), thick))
     named = dict(zip(("paper_notes", "paper_other"), notes, strict=True))
     if style == 2:
         thick = rng.uniform(0.006, 0.02)
-        named["paper_bundle"] = [box(x, y, thick, 0.0012, 1).at(z=-thick - 0.004)]
-        named["band"] = [box(0.03, y + 0.001, thick + 0.001, 0.0016, 2).at(0.1 * x, 0, -thick - 0.0045)]
+        named["paper_bundle"] = [box(x, y, thick, 0.0012, 1).at(z=-thick - 0.0005)]
+        named["band"] = [box(0.03, y + 0.001, thick + 0.001, 0.0016, 2).at(0.1 * x, 0, -thick - 0.001)]
     return {name: solids for name, solids in named.items() if solids}
 
 
@@ -98,15 +98,17 @@ def cards(rng: np.random.Generator) -> Parts:
                     )
                     faces.append(roof)
     else:
-        count = int(rng.integers(4, 20))
+        count, heap = int(rng.integers(4, 20)), Heap(7 * y, 0.006)
+        flat = _net(x, y, 0.006)
         for k in range(count):
+            place, turn = np.array((0.0, 0.9 * y)), 80 * (k / count - 0.5)
             if style == 0:
-                leaf = card.at(0, 0.9 * y).turned(z_deg=80 * (k / count - 0.5))
+                place = rotation_matrix(z_deg=turn)[:2, :2] @ place
             else:
-                leaf = card.turned(z_deg=rng.uniform(0, 360)).at(*rng.normal(0, 1.1 * y, 2))
-            (faces if rng.random() < 0.7 else backs).append(
-                leaf.turned(x_deg=rng.normal(0, 0.3)).at(z=0.0012 * k)
-            )
+                turn, place = rng.uniform(0, 360), rng.normal(0, 1.1 * y, 2)
+            plane = heap.lay(rotation_matrix(z_deg=turn) @ flat + np.r_[place, 0.0002][:, None], 0.0004)
+            leaf = leant(card.turned(z_deg=turn).at(*place), plane[None])
+            (faces if rng.random() < 0.7 else backs).append(leaf)
     return {name: solids for name, solids in (("paper_faces", faces), ("paper_backs", backs)) if solids}
 
 
@@ -201,6 +203,13 @@ def _rounded(x: float, y: float, radius: float) -> np.ndarray:
         turn = rotation_matrix(z_deg=90 * k)[:2, :2]
         out.append(corner @ turn.T + (sx * (x / 2 - radius), sy * (y / 2 - radius)))
     return np.vstack(out)
+
+
+def _net(x: float, y: float, step: float) -> np.ndarray:
+    """(3, n) points of a flat rectangle, not farther apart than `step`."""
+    along = [np.linspace(-side / 2, side / 2, int(side / step) + 2) for side in (x, y)]
+    u, v = (a.ravel() for a in np.meshgrid(*along))
+    return np.stack([u, v, 0 * u])
 
 
 def _on_floor(grid: np.ndarray, floor: float) -> Solid:
