@@ -308,6 +308,49 @@ def test_what_is_thin_lies_on_what_is_below_it(family):
             assert max(gaps) < 0.02 * width[:2].max(), (family, seed)
 
 
+def test_bricks_stand_on_bricks_and_enter_none():
+    for seed in range(12):
+        parts = solids_of("studded_bricks", seed)
+        boxes = np.array([(s.vertices.min(0), s.vertices.max(0)) for g in parts.values() for s in g])
+        low, high = boxes[:, 0], boxes[:, 1] - np.where(np.arange(len(boxes))[:, None] > 0, (0, 0, 0.0017), 0)
+        shared = np.minimum(high[:, None], high) - np.maximum(low[:, None], low)
+        both = shared.min(2) > 1e-4
+        np.fill_diagonal(both, False)
+        assert not both.any(), seed
+        under = (np.abs(low[:, None, 2] - high[:, 2]) < 1e-4) & (shared[..., :2].min(2) > 0.002)
+        assert under[1:].any(1).all(), seed
+
+
+def times_through(one: np.ndarray, other: np.ndarray) -> float:
+    """How often a closed path (n, 3) goes through another: Gauss's linking number, without its sign."""
+    steps = [np.roll(path, -1, axis=0) - path for path in (one, other)]
+    a, b = (path + step / 2 for path, step in zip((one, other), steps, strict=True))
+    apart = a[:, None] - b
+    turned = np.cross(steps[0][:, None], steps[1])
+    return abs(float(((apart * turned).sum(2) / np.linalg.norm(apart, axis=2) ** 3).sum())) / (4 * np.pi)
+
+
+def test_links_and_ring_of_a_chain_are_linked():
+    """Each goes through the next once, the ring through the first; wires share less than half a radius."""
+    for seed in range(12):
+        parts = solids_of("chain", seed)
+        rings, radii = [], []
+        for solid, sides in ((parts["metal_ring"][0], 8), (parts["metal"][0], 7)):
+            tubes = solid.vertices.reshape(-1, 18, sides, 3)
+            middles = tubes.mean(2)
+            share = np.linspace(0, 1, 10, endpoint=False)[:, None, None]
+            fine = middles[:, :, None] + share[:, 0] * (np.roll(middles, -1, axis=1) - middles)[:, :, None]
+            rings += list(fine.reshape(len(tubes), -1, 3))
+            radii += [float(np.linalg.norm(tubes[0, 0, 0] - middles[0, 0]))] * len(tubes)
+        for one in range(len(rings) - 1):
+            assert times_through(rings[one], rings[one + 1]) == pytest.approx(1, abs=0.1), (seed, one)
+        trees = [cKDTree(ring) for ring in rings]
+        for one, tree in enumerate(trees):
+            for other in range(one):
+                near = tree.query(rings[other])[0].min()
+                assert near > radii[one] + radii[other] - 0.5 * radii[-1], (seed, one, other)
+
+
 def groups_that_touch(solids: list[Solid]) -> list[set[int]]:
     """Numbers of solids: from each of a group a path of solids that touch leads to all of it."""
     step = 0.008 * float(np.ptp(np.concatenate([s.vertices for s in solids]), axis=0).max())

@@ -145,7 +145,7 @@ def thread_spools(rng: np.random.Generator) -> Parts:
 def chain(rng: np.random.Generator) -> Parts:
     """Chain of round or long links, lying in a curve, perhaps with a ring at its end."""
     wire = rng.uniform(0.002, 0.006)
-    links, long = int(rng.integers(14, 34)), rng.uniform(1.0, 2.2)
+    links, long = int(rng.integers(14, 34)), rng.uniform(1.35, 2.2)
     inner = 1.5 * wire
     a = np.linspace(0, 2 * np.pi, 18, endpoint=False)
     oval = np.c_[
@@ -154,12 +154,20 @@ def chain(rng: np.random.Generator) -> Parts:
     link = sweep(oval, wire, 7, closed=True)
     pitch = 2 * (float(oval[:, 0].max()) - wire)
     way = np.cumsum(rng.normal(0, 0.16, links)) + rng.uniform(0.1, 0.3) * np.arange(links)
-    places = np.cumsum(pitch * np.c_[np.cos(way), np.sin(way), 0 * way], axis=0)
-    turns = [
-        rotation_matrix(35 + 90 * (k % 2) + rng.normal(0, 6), 0, np.degrees(w)) for k, w in enumerate(way)
-    ]
-    ring = sweep(2.2 * oval, 1.3 * wire, 8, closed=True).turned(x_deg=20).at(*places[0])
-    return {"metal": [copies(link, np.array(turns), places)], "metal_ring": [ring]}
+    end, wide = float(oval[:, 0].max()), 2.2  # the ring is as many times a link
+    places, ring_at = _hung(way, pitch, (1 + wide) * end)
+    while _meet(places, 2 * (end + wire)) or _near(ring_at, places[1:], (1 + wide) * end):
+        way *= 0.85  # it came back to itself
+        places, ring_at = _hung(way, pitch, (1 + wide) * end)
+    # One link leans this way, the next that way; the first stands, and a ring that lies goes through it.
+    roll = 35 + 55 * np.clip(1 - np.arange(links) / 5, 0, 1) + 90 * (np.arange(links) % 2)
+    turns = [rotation_matrix(r + rng.normal(0, 6), 0, np.degrees(w)) for r, w in zip(roll, way, strict=True)]
+    chained = copies(link, np.array(turns), places)
+    thick = 1.3 * wire
+    drop = np.arcsin((chained.vertices[:, 2].min() + thick) / (2 * wide * end))
+    ring = sweep(wide * (oval - (end, 0, 0)), thick, 8, closed=True).at(x=wire + thick - end)
+    ring = ring.turned(y_deg=float(np.degrees(drop))).turned(z_deg=float(np.degrees(way[0]))).at(*places[0])
+    return {"metal": [chained], "metal_ring": [ring]}
 
 
 @mesh_family("springs")
@@ -206,6 +214,22 @@ def beads(rng: np.random.Generator) -> Parts:
     for name, (bead, _), group in zip(("beads", "glass_beads"), kinds, groups, strict=True):
         parts[name] = [copies(bead, np.array([g[0] for g in group]), np.array([g[1] for g in group]))]
     return parts
+
+
+def _hung(way: np.ndarray, pitch: float, far: float) -> tuple[np.ndarray, np.ndarray]:
+    """Middles (n, 3) of links that head for `way` (rad), end to end, and of a ring `far` behind the first."""
+    heading = np.c_[np.cos(way), np.sin(way), 0 * way]
+    places = np.cumsum(pitch / 2 * (heading + np.roll(heading, 1, axis=0)), axis=0)
+    return places, places[0] - far * heading[0]
+
+
+def _meet(places: np.ndarray, reach: float) -> bool:
+    """Whether two places four or more after each other are closer than `reach`."""
+    return any(_near(place, places[k + 4 :], reach) for k, place in enumerate(places[:-4]))
+
+
+def _near(place: np.ndarray, others: np.ndarray, reach: float) -> bool:
+    return bool((np.linalg.norm(others - place, axis=1) < reach).any())
 
 
 def _bead_rand(rng: np.random.Generator, size: float) -> tuple[Solid, float]:

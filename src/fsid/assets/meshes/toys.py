@@ -50,29 +50,48 @@ def toy_blocks(rng: np.random.Generator) -> Parts:
 @mesh_family("studded_bricks")
 def studded_bricks(rng: np.random.Generator) -> Parts:
     """Plastic bricks with studs, stacked crosswise in four colours."""
-    unit, tall = 0.008, 0.0096
+    unit, tall, thick = 0.008, 0.0096, 0.0032
     stud = lathe([(0.0024, 0), (0.0024, 0.0017), (0.0021, 0.002), (0, 0.002)], 14)
-    parts: tuple[list[Solid], ...] = ([box(14 * unit, 10 * unit, 0.0032, 0.0003, 1)], [], [], [])
-    for tower in range(int(rng.integers(1, 5))):
-        x, y = (unit + 0.0003 * tower) * rng.integers(-4, 5), (unit + 0.0003 * tower) * rng.integers(-3, 4)
-        for level in range(int(rng.integers(1, 6))):
-            nx, ny = int(rng.choice((1, 2, 2, 3, 4))), int(rng.choice((1, 2, 2, 4)))
-            brick = box(nx * unit - 0.0002, ny * unit - 0.0002, tall - 0.0001, 0.0003, 1)
-            columns, rows = np.arange(nx) - (nx - 1) / 2, np.arange(ny) - (ny - 1) / 2
-            grid = np.stack(np.meshgrid(columns, rows), -1).reshape(-1, 2) * unit
-            studs = copies(
-                stud, np.repeat(np.eye(3)[None], len(grid), 0), np.c_[grid, np.full(len(grid), tall - 0.0003)]
-            )
-            turn = 90.0 * rng.integers(2) + rng.normal(0, 2) * (rng.random() < 0.3)
-            placed = (
-                join([brick, studs])
-                .turned(z_deg=turn)
-                .at(x, y, 0.0034 + level * (tall + 0.0002) + 0.0007 * tower)
-            )
-            parts[rng.integers(4)].append(placed)
-            x, y = x + unit * rng.integers(-1, 2), y + unit * rng.integers(-1, 2)
+    ground = np.array((14, 10))
+    parts: tuple[list[Solid], ...] = ([box(14 * unit, 10 * unit, thick, 0.0003, 1)], [], [], [])
+    taken = np.zeros((5, *ground), bool)
+    for _ in range(int(rng.integers(1, 5))):
+        low = ground // 2 + (rng.integers(-4, 5), rng.integers(-3, 4))
+        tower: list[np.ndarray] = []
+        colours: list[int] = []
+        for _ in range(int(rng.integers(1, 6))):
+            size = np.array((rng.choice((1, 2, 2, 3, 4)), rng.choice((1, 2, 2, 4))))[
+                :: 1 - 2 * rng.integers(2)
+            ]
+            if tower:  # on one stud at least
+                low = np.clip(low + rng.integers(-1, 2, 2), tower[-1][0] + 1 - size, tower[-1][1] - 1)
+            tower.append(np.stack([low, low + size]))
+            colours.append(int(rng.integers(4)))
+        for level, (low, high) in enumerate(_beside(tower, taken)):
+            taken[level, low[0] : high[0], low[1] : high[1]] = True
+            size, (x, y) = high - low, (low + high - ground) / 2 * unit
+            grid = (np.indices(tuple(size)).reshape(2, -1).T - (size - 1) / 2) * unit
+            studs = copies(stud, np.repeat(np.eye(3)[None], len(grid), 0), np.c_[grid, 0 * grid[:, 0]])
+            long, wide = (float(side) for side in size * unit - 0.0002)
+            brick = box(long, wide, tall, 0.0003, 1)
+            placed = join([brick, studs.at(z=tall - 0.0003)]).at(x, y, thick + level * tall)
+            parts[colours[level]].append(placed)
     named = zip(("plastic_a", "plastic_b", "plastic_c", "plastic_d"), parts, strict=True)
     return {name: solids for name, solids in named if solids}
+
+
+def _beside(tower: list[np.ndarray], taken: np.ndarray) -> list[np.ndarray]:
+    """Bricks (low, high) of a tower, level by level, moved as little as need be to cells that are not `taken`
+    (levels, x, y); none where there is no room."""
+    moves = np.indices([2 * n - 1 for n in taken.shape[1:]]).reshape(2, -1).T - np.array(taken.shape[1:]) + 1
+    for move in moves[np.argsort((moves**2).sum(1), kind="stable")]:
+        moved = [brick + move for brick in tower]
+        inside = all((low >= 0).all() and (high <= taken.shape[1:]).all() for low, high in moved)
+        if inside and not any(
+            taken[level, low[0] : high[0], low[1] : high[1]].any() for level, (low, high) in enumerate(moved)
+        ):
+            return moved
+    return []
 
 
 @mesh_family("toy_car")
