@@ -141,10 +141,11 @@ def compare(
 
 
 def _noisy(path: Path, truth: Raw) -> Raw:
+    """A capture, with the colours of its truth: a phone may balance white in each frame of a burst anew."""
     noisy = read_raw(path)
     if truth.mosaic.shape != noisy.mosaic.shape or truth.cfa != noisy.cfa:
         raise FsidError(f"{path}: size or CFA differs from its clean.dng")
-    return noisy
+    return replace(noisy, white_balance=truth.white_balance, xyz_to_camera=truth.xyz_to_camera)
 
 
 def _denoised(method: Method, frame: Raw) -> Raw:
