@@ -164,6 +164,12 @@ def test_a_thumbnail_before_the_mosaic_is_not_read_for_it(tmp_path):
     np.testing.assert_array_equal(read_dn(tmp_path / "a.tif"), DN)
 
 
+def test_a_white_level_between_two_integers_is_refused():
+    """Black levels are means, which have fractions; white is a DN, and 4094.9 was taken for 4094."""
+    with pytest.raises(FsidError, match=r"white level 4094\.9 is no whole DN"):
+        raw_from_dn(DN, cfa="RGGB", black_level=64.5, white_level=4094.9)
+
+
 def test_a_size_below_0_is_none(tmp_path):
     DN.tofile(tmp_path / "a.raw")
     with pytest.raises(FsidError, match=r"a\.raw: a headerless mosaic needs its width and height"):

@@ -121,6 +121,8 @@ def raw_from_dn(
     black = BlackLevels.stated(black_level, cfa, source)
     for stated in (black.tile.min(), black.tile.max()):
         check_levels(stated, white_level, source)
+    if white_level != int(white_level):
+        raise FsidError(f"{source}: white level {white_level} is no whole DN")
     dn = _even(np.asarray(dn), source)
     check_bayer(dn, source)
     level, white_level = round(black.mean()), int(white_level)
