@@ -181,6 +181,26 @@ def test_noise_profile_of_other_writers_is_exact(tmp_path):
     assert back.iso == 2371
 
 
+def test_a_noise_profile_and_an_iso_that_were_corrected_afterwards_are_read(tmp_path):
+    """By a program that knows tags, and leaves FSID's private data as they were."""
+    path = tmp_path / "a.dng"
+    write_dng(path, _raw())
+    with tifffile.TiffFile(path, mode="r+") as file:
+        level = (1e-3, 1e-6, 2e-3, 2e-6, 3e-3, 3e-6)
+        file.pages[0].tags["NoiseProfile"].overwrite(level)
+    back = read_raw(path)
+    assert noise_profile(back.noise) == level
+    assert back.iso == 2371.375
+    path.write_bytes(path.read_bytes().replace((2371).to_bytes(2, "little"), (800).to_bytes(2, "little")))
+    assert read_raw(path).iso == 800
+
+
+def test_a_noise_level_in_single_precision_keeps_its_greens_apart(tmp_path):
+    k, sigma2 = (tuple(np.float32(v)) for v in ((1e-3, 2e-3, 3.3e-3, 4e-3), (1e-6, 2e-6, 3e-6, 4e-6)))
+    write_dng(tmp_path / "a.dng", replace(_raw(), noise=NoiseLevel(k, sigma2)))
+    assert read_raw(tmp_path / "a.dng").noise == NoiseLevel(k, sigma2)
+
+
 def test_unknown_stays_unknown(tmp_path):
     write_dng(tmp_path / "a.dng", replace(_raw(), noise=None, iso=0.0, camera=""))
     back = read_raw(tmp_path / "a.dng")

@@ -5,7 +5,8 @@
 
 NoiseProfile has one pair per colour plane, R, G, B, and so no place for the difference between Gr and Gb: its
 green pair is their mean. The four exact pairs and the exact ISO (the tag holds integers) stand in
-DNGPrivateData as JSON behind the owner name "FSID"; without that, both greens get the green pair.
+DNGPrivateData as JSON behind the owner name "FSID"; without that, and where the tags say something else, both
+greens get the green pair.
 """
 
 from __future__ import annotations
@@ -59,6 +60,7 @@ MAX_SIDE = 65535  # pixels that LibRaw opens
 MAX_REPEAT = 16  # rows and columns of a pattern of black levels; LibRaw rounds them and keeps 2 x 2
 
 _OWNER = b"FSID\0"
+_SAME = 1e-5  # relative, of a tag and what FSID wrote there, in single precision too
 
 
 def camera_tags(raw: Raw) -> tuple[Tag, ...]:
@@ -112,8 +114,13 @@ def mosaic_tags(raw: Raw) -> tuple[Tag, ...]:
 
 def exif_tags(raw: Raw) -> tuple[Tag, ...]:
     """Tags of the EXIF directory: what the source said, and the ISO as the integer that the tag holds."""
-    iso = round(min(raw.iso, MAX_EXIF_ISO))
+    iso = whole_iso(raw.iso)
     return merged((Tag(EXIF_ISO, SHORT, (iso,)),) if iso > 0 else (), raw.metadata.exif)
+
+
+def whole_iso(iso: float) -> int:
+    """As the EXIF tag holds it; 0 where it cannot."""
+    return max(round(min(iso, MAX_EXIF_ISO)), 0)
 
 
 def noise_profile(level: NoiseLevel) -> tuple[float, ...]:
@@ -125,10 +132,12 @@ def noise_profile(level: NoiseLevel) -> tuple[float, ...]:
 
 def noise_level(tags: Tags) -> NoiseLevel | None:
     """The noise that `tags` state, exact where FSID wrote them; None where they state none."""
-    private = _private_numbers(tags)
+    private, values = _private_numbers(tags), _numbers(tags, NOISE_PROFILE)
     if len(private) == 9:
-        return NoiseLevel(k=private[1:5], sigma2=private[5:9])
-    values = _numbers(tags, NOISE_PROFILE)
+        exact = NoiseLevel(k=private[1:5], sigma2=private[5:9])
+        told = noise_profile(exact)
+        if len(values) == len(told) and np.allclose(values, told, rtol=_SAME, atol=0):  # else corrected since
+            return exact
     if len(values) == 2:
         values *= 3
     if len(values) != 6 or not np.all(np.isfinite(values)):
@@ -142,9 +151,10 @@ def iso_speed(tags: Tags) -> float:
 
     65535 is the largest that the tag holds and means more; then others say how much (EXIF 2.3, 4.6.5).
     """
-    if private := _private_numbers(tags):
-        return float(private[0])
     iso = float(_number(tags, EXIF_ISO, 0))
+    private = _private_numbers(tags)
+    if private and whole_iso(private[0]) == iso:  # else corrected since
+        return float(private[0])
     if iso < MAX_EXIF_ISO:
         return iso
     return max(iso, *(float(_number(tags, code, 0)) for code in LARGE_ISOS))
