@@ -217,7 +217,7 @@ def test_a_noise_profile_of_zeros_is_none(
         noise_of(replace(noisy_raw(), noise=NoiseLevel((1e-3,) * 4, below)), None, None, folder / "b.dng")
 
 
-def test_black_levels_that_a_profile_contradicts_are_said(
+def test_a_layout_that_a_profile_contradicts_is_said(
     tmp_path: Path, network: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     measured = Measurement(
@@ -233,13 +233,19 @@ def test_black_levels_that_a_profile_contradicts_are_said(
     save_profile(tmp_path / "mine.yaml", mine)
     np.save(tmp_path / "a.npy", to_dn(noisy_raw()))
     command = ["denoise", str(tmp_path / "a.npy"), str(tmp_path / "a.dng"), "--model", str(network)]
-    command += ["--profile", str(tmp_path / "mine.yaml"), "--iso", "800", "--cfa", PROFILE.cfa]
+    command += ["--profile", str(tmp_path / "mine.yaml"), "--iso", "800"]
+    own = ["--cfa", PROFILE.cfa, "--white-level", "1023"]
     for levels, is_said in (("65", True), ("60,66,64,70", False)):
-        main([*command, "--white-level", "1023", "--black-level", levels])
-        assert ("without --black-level 60,66,64,70" in capsys.readouterr().err) == is_said
+        main([*command, *own, "--black-level", levels])
+        said = capsys.readouterr().err
+        assert ("without --black-level 60,66,64,70" in said) == is_said
+        assert "was measured on frames of" not in said
+    for cfa, white, what in (("BGGR", "1023", "--cfa BGGR"), (PROFILE.cfa, "4095", "--white-level 4095")):
+        main([*command, "--cfa", cfa, "--white-level", white, "--black-level", "60,66,64,70"])
+        assert f"note: {what}: profile {tmp_path / 'mine.yaml'} was measured on" in capsys.readouterr().err
     for levels in ("60,66", "60;66", ""):
         with pytest.raises(SystemExit):
-            main([*command, "--white-level", "1023", "--black-level", levels])
+            main([*command, *own, "--black-level", levels])
         assert "--black-level" in capsys.readouterr().err
 
 

@@ -77,7 +77,7 @@ def denoise(
         raise FsidError("--skip-existing: is for a folder of files; leave it out")
     if layout is not None:
         _check_layout(layout, sources or [input])
-        _note_black(layout, profile, quiet=quiet)
+        _note_other_frames(layout, profile, quiet=quiet)
     network = load_model(model, backend)
     check_options(profile, iso, strength, layout)
     console = Terminal(stderr=True)
@@ -132,15 +132,23 @@ def _note(line: str, *, quiet: bool = False) -> None:
     Terminal(stderr=True, quiet=quiet).print(Text(f"note: {line}"), soft_wrap=True)
 
 
-def _note_black(layout: Layout, profile: str | None, *, quiet: bool) -> None:
-    """A line where the calibration of the camera measured other black levels than those that are stated."""
+def _note_other_frames(layout: Layout, profile: str | None, *, quiet: bool) -> None:
+    """Lines where what is stated is not what the frames had from which the camera was calibrated."""
     from fsid.sensor import load_bayer_profile
     from fsid.sensor.camera_fit import SITES_APART_DN
 
-    measured = None if profile is None else load_bayer_profile(profile).measured
-    if measured is None or layout.black_level is None:
+    camera = None if profile is None else load_bayer_profile(profile)
+    if camera is None or camera.measured is None or layout.black_level is None:
         return
-    black = measured.black.mean(axis=0)
+    measured = f"profile {profile} was measured on frames of"
+    if layout.cfa != camera.cfa:
+        line = f"--cfa {layout.cfa}: {measured} {camera.cfa}; of such a frame red and blue go wrong"
+        _note(line, quiet=quiet)
+    if layout.white_level != camera.white_level:
+        line = f"--white-level {layout.white_level}: {measured} {camera.white_level}"
+        _note(f"{line}; of such a frame the noise is taken for another than it is", quiet=quiet)
+        return
+    black = camera.measured.black.mean(axis=0)
     if np.abs(black - np.asarray(layout.black_level)).max() > SITES_APART_DN:
         levels = ",".join(f"{level:.4g}" for level in black)
         line = f"without --black-level {levels}, as profile {profile} measured, a cast stays"
