@@ -414,6 +414,35 @@ def test_a_folder_of_pictures_may_move(album: Path, tmp_path: Path):
         generate(out, replace(config, images=str(moved)), count=3)
 
 
+def test_pairs_of_another_noise_do_not_go_on_a_dataset(album: Path, tmp_path: Path):
+    """A profile that was calibrated again has its name, and other noise."""
+    out, mine, profile = tmp_path / "out", tmp_path / "mine.yaml", load_profile("pixel6")
+    save_profile(mine, profile)
+    config = small(f"images={album}", f"cameras=[{mine}]")
+    generate(out, config, count=1)
+    record = tmp_path / "00000000.json"
+    record.write_bytes(read_member(shard_path(out, 0), "00000000.json"))
+    save_profile(mine, replace(profile, notes="the same noise"))
+    assert generate(out, config, count=2) == 1
+    assert make_only(tmp_path / "again", str(record), None, None)
+    save_profile(mine, replace(profile, k=1.1 * profile.k))
+    for again in (lambda: generate(out, config, count=3), lambda: make_only(out, "2", None, None)):
+        with pytest.raises(FsidError, match=r"out: was begun with another noise than .*mine\.yaml says now"):
+            again()
+    with pytest.raises(FsidError, match="was made with another k than "):
+        make_only(tmp_path / "again", str(record), None, None)
+
+
+def test_a_dataset_of_before_profiles_were_told_apart_goes_on(album: Path, tmp_path: Path):
+    save_profile(tmp_path / "mine.yaml", load_profile("pixel6"))
+    out, config = tmp_path / "out", small(f"images={album}", f"cameras=[{tmp_path / 'mine.yaml'}]")
+    generate(out, config, count=1)
+    plain = read_yaml(out / "config.yaml")
+    assert len(plain.pop("profiles_digest")) == 16
+    (out / "config.yaml").write_text(yaml.safe_dump(plain))
+    assert generate(out, config, count=2) == 1
+
+
 def test_settings_made_in_python_are_those_of_a_file(tmp_path: Path):
     config = small("width=64", "height=48")
     loose = replace(config, width=np.int64(64), cameras=["pixel6"])

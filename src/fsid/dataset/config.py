@@ -154,7 +154,8 @@ class DatasetConfig:
     """What `config.yaml` beside the shards says: the identity of the dataset.
 
     pictures: how many there are in the folder `generate.images`; 0 for scenes. pictures_digest: of their
-    names and sizes; "" for scenes, and unknown in what FSID wrote before it was recorded.
+    names and sizes; "" for scenes, and unknown in what FSID wrote before it was recorded. profiles_digest: of
+    the noise in profiles that are files; "" where there is none, and likewise.
     """
 
     seed: int
@@ -162,6 +163,7 @@ class DatasetConfig:
     generate: GenerateConfig
     pictures: int = 0
     pictures_digest: str = ""
+    profiles_digest: str = ""
 
     def __post_init__(self) -> None:
         check_fields(self)

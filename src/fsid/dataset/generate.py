@@ -31,6 +31,7 @@ from fsid.dataset.worker import Worker
 from fsid.errors import FsidError
 from fsid.files import held
 from fsid.sensor import load_bayer_profile
+from fsid.sensor.profiles import profiles_digest
 
 SHARD_SIZE = 16
 SAMPLES_PER_WORKER = 320
@@ -182,7 +183,8 @@ def dataset_config(config: GenerateConfig, seed: int, shard_size: int = 0) -> Da
     if shard_size < 1 or shard_size % pairs:
         raise FsidError(f"shard size {shard_size}: is not a multiple of the {pairs} pairs of a frame")
     digest = pictures_digest(pictures) if pictures else ""
-    return DatasetConfig(seed, shard_size, config, len(pictures), digest)
+    noise = profiles_digest(config.cameras)
+    return DatasetConfig(seed, shard_size, config, len(pictures), digest, noise)
 
 
 @contextmanager
@@ -223,12 +225,15 @@ def is_begun(out: Path, dataset: DatasetConfig) -> bool:
         return False
     there = _used(from_plain(DatasetConfig, read_yaml(file), source=str(file)))
     here = _used(dataset if there.pictures_digest else replace(dataset, pictures_digest=""))
+    if not there.profiles_digest:
+        here = replace(here, profiles_digest="")
     if there.pictures_digest and there.pictures_digest == here.pictures_digest:  # their folder may move
         here = replace(here, generate=replace(here.generate, images=there.generate.images))
     if there == here or not (any(out.glob("shard-*.tar")) or any(out.glob("*.clean.dng"))):
         return there == here
     if there.generate == here.generate and there.seed == here.seed:
         check_same_pictures(out, there)
+        check_same_profiles(out, there)
     keys = ", ".join(_differing(to_plain(there), to_plain(here)))
     raise FsidError(
         f"{out}: already holds another dataset; these differ: {keys}. "
@@ -247,6 +252,16 @@ def check_same_pictures(out: Path, dataset: DatasetConfig) -> None:
             f"{dataset.generate.images}: holds other pictures than those that {out} was begun with (names or "
             f"sizes differ; {dataset.pictures} then, {len(pictures)} now); "
             "put those back, or use another folder"
+        )
+
+
+def check_same_profiles(out: Path, dataset: DatasetConfig) -> None:
+    """FsidError unless the profiles of `dataset`, in `out`, say the noise that it began with, if known."""
+    cameras = dataset.generate.cameras
+    if dataset.profiles_digest not in ("", profiles_digest(cameras)):
+        raise FsidError(
+            f"{out}: was begun with another noise than {', '.join(cameras)} says now; "
+            "put the file back as it was, or use another folder"
         )
 
 

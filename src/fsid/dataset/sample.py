@@ -26,6 +26,7 @@ from fsid.scene import Scene, scene_from_json
 from fsid.sensor import Raw, clean_levels, develop, write_dng
 
 ATTEMPTS = 8
+_SAME_NOISE = 1e-6  # relative: a machine may round otherwise
 
 
 def scene_of(config: GenerateConfig, seed: int, index: int) -> Scene:
@@ -95,7 +96,18 @@ def remake(record: dict[str, Any], renderer: SceneRenderer | None) -> Sample:
             f"sample {sample_key(index)}: was made from {record.get('image')}, but {config.images} now has "
             f"{made} in its place; put its pictures back"
         )
+    _check_same_noise(samples[place].record, record)
     return samples[place]
+
+
+def _check_same_noise(made: dict[str, Any], record: dict[str, Any]) -> None:
+    """FsidError where the profile says another noise now than `record`; the ISO is drawn, and stays."""
+    for key in ("k", "sigma2"):
+        if key in record and not np.allclose(made[key], record[key], rtol=_SAME_NOISE, atol=0):
+            raise FsidError(
+                f"sample {made['key']}: was made with another {key} than {made['profile']} says now; "
+                "put the profile back as it was"
+            )
 
 
 def _whole(record: dict[str, Any], key: str) -> int:

@@ -12,6 +12,7 @@ beyond k and sigma2 (see `terms`); without it the model is the paper's. Own prof
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict
@@ -78,6 +79,24 @@ def check_bayer(profile: CameraProfile, source: str) -> None:
     """FsidError, naming `source`, where the camera has no colour filters and so makes no mosaics."""
     if profile.cfa == MONO:
         raise FsidError(f"{source}: is of a sensor without colour filters; give a Bayer camera's profile")
+
+
+def profiles_digest(names: Iterable[str | Path]) -> str:
+    """16 hexadecimal digits of the noise, levels and colour in the files among `names`; "" where all are
+    built in. A file may move, and what it says of its origin and optics may change."""
+    own = [load_profile(name) for name in names if str(name) not in profile_names()]
+    if not own:
+        return ""
+    facts = [(p.cfa, p.black_level, p.white_level, p.iso, _switched_on(p.terms)) for p in own]
+    arrays = [(p.k, p.sigma2, p.xyz_to_camera, *_errors(p)) for p in own]
+    numbers = [[array.tolist() for array in each] for each in arrays]
+    return hashlib.sha256(repr((facts, numbers)).encode()).hexdigest()[:16]
+
+
+def _errors(profile: CameraProfile) -> tuple[np.ndarray, ...]:
+    """What decides, beside the levels, how they are interpolated."""
+    measured = profile.measured
+    return () if measured is None else (measured.k_error, measured.sigma2_error)
 
 
 def far_extrapolated(names: Iterable[str | Path], iso_min: float, iso_max: float) -> Iterator[CameraProfile]:
