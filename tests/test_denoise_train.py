@@ -47,7 +47,7 @@ from fsid.denoise.validate import Validation, _captures, held_out, validation  #
 from fsid.errors import FsidError  # noqa: E402
 from fsid.files import held  # noqa: E402
 from fsid.pace import Pace  # noqa: E402
-from fsid.sensor import Raw, add_noise, clean_levels, load_profile, write_dng  # noqa: E402
+from fsid.sensor import Raw, add_noise, clean_levels, load_profile, save_profile, write_dng  # noqa: E402
 
 CONFIG = TrainConfig(
     network=NetworkConfig(width=4, encoder_blocks=(1,), middle_blocks=1, decoder_blocks=(1,)),
@@ -485,6 +485,19 @@ def test_a_run_goes_on_with_settings_that_change_nothing(data: Path, tmp_path: P
     assert all(torch.equal(weights[name], expected[name]) for name in expected)
     with pytest.raises(FsidError, match="another threads;"):
         train(data, stopped, replace(CONFIG, threads=2), quiet=True)
+
+
+def test_a_run_stays_with_its_noise(data: Path, tmp_path: Path) -> None:
+    """A profile that was calibrated again has its name, and other noise."""
+    run, mine, profile = tmp_path / "run", tmp_path / "mine.yaml", load_profile("pixel6")
+    config = replace(CONFIG, steps=1, profiles=(str(mine),))
+    save_profile(mine, profile)
+    train(data, run, config, quiet=True)
+    save_profile(mine, replace(profile, notes="the same noise"))
+    train(data, run, config, quiet=True)
+    save_profile(mine, replace(profile, k=1.1 * profile.k))
+    with pytest.raises(FsidError, match=r"run: this run was started with another noise than .*mine\.yaml"):
+        train(data, run, config, quiet=True)
 
 
 @pytest.mark.parametrize("has_settings", [True, False])

@@ -13,6 +13,7 @@ from fsid.denoise.sessions import read_sessions
 from fsid.denoise.train_config import TrainConfig
 from fsid.errors import FsidError
 from fsid.files import make_folder
+from fsid.sensor.profiles import profiles_digest
 
 CONFIG_FILE = "config.yaml"
 _WITHOUT_EFFECT = {"checkpoint_every", "loader_processes", "tensorboard"}
@@ -72,8 +73,13 @@ def _check_same_run(data_dir: Path, run_dir: Path, there: TrainConfig, config: T
             f"{run_dir / CONFIG_FILE}: this run was started with another {', '.join(changed)}; "
             "continue it with its own settings or give another folder"
         )
-    data = identity(data_dir)
-    if any(row.get("data", data) != data for row in read_sessions(run_dir)):
+    rows, data, noise = read_sessions(run_dir), identity(data_dir), profiles_digest(config.profiles)
+    if any(row.get("noise", noise) != noise for row in rows):
+        raise FsidError(
+            f"{run_dir}: this run was started with another noise than {', '.join(config.profiles)} says now; "
+            "put the file back as it was or give another folder"
+        )
+    if any(row.get("data", data) != data for row in rows):
         raise FsidError(
             f"{run_dir}: this run was started on other data than {data_dir}; "
             "continue it with its own dataset or give another folder"

@@ -1,9 +1,10 @@
 """Under what circumstances a network was trained: command, hardware and time, one row per start of the run.
 
-    sessions.json = [{command, hardware, processes, data, held_out, first_step, last_step, seconds}, ...]
+    sessions.json = [{command, hardware, processes, data, noise, held_out, first_step, last_step, seconds}]
 
-`data` is the identity of the dataset, `held_out` the keys of its images that are for validation: those of a
-run's beginning stay so when the dataset grows. Both are absent in older runs.
+`data` is the identity of the dataset, `noise` that of the profiles that are files ("" where none is),
+`held_out` the keys of its images that are for validation: those of a run's beginning stay so when the dataset
+grows. All three are absent in older runs.
 
 They stand apart from checkpoint and model, which hold what follows from settings and seed alone and so are
 the same bits on every run. A row is brought up to date with every checkpoint: what a kill loses of the
@@ -30,7 +31,10 @@ SESSIONS_FILE = "sessions.json"
 
 
 class Session:
-    """The row of a run that starts now at `first_step`. data: `fsid.dataset.index.identity`."""
+    """The row of a run that starts now at `first_step`.
+
+    data: `fsid.dataset.index.identity`. noise: `fsid.sensor.profiles.profiles_digest`.
+    """
 
     def __init__(
         self,
@@ -39,6 +43,7 @@ class Session:
         first_step: int,
         processes: int,
         data: str,
+        noise: str,
         held_out: Sequence[str],
     ) -> None:
         self._path, self._start = run_dir / SESSIONS_FILE, time.monotonic()
@@ -49,6 +54,7 @@ class Session:
             "hardware": hardware(),
             "processes": processes,
             "data": data,
+            "noise": noise,
             "held_out": list(held_out),
         }
 

@@ -45,6 +45,7 @@ from fsid.denoise.train_config import TrainConfig
 from fsid.denoise.validate import held_out, validation
 from fsid.errors import FsidError
 from fsid.files import check_folder, held, write_atomically
+from fsid.sensor.profiles import profiles_digest
 from fsid.terminal import Terminal
 
 HISTORY_FILE, VALIDATION_FILE = "history.json", "validation.json"
@@ -170,6 +171,7 @@ class _Keeper:
             state.step,
             accelerator.num_processes,
             identity(data_dir),
+            profiles_digest(config.profiles),
             [mosaic.key for mosaic in kept],
         )
         self._board = Board(run_dir, state.step, wanted=config.tensorboard and main)
