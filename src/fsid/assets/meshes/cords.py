@@ -143,7 +143,7 @@ def thread_spools(rng: np.random.Generator) -> Parts:
 
 @mesh_family("chain")
 def chain(rng: np.random.Generator) -> Parts:
-    """Chain of round or long links, lying in a curve, perhaps with a ring at its end."""
+    """Chain of oval or long links, lying in a curve, perhaps with a ring at its end."""
     wire = rng.uniform(0.002, 0.006)
     links, long = int(rng.integers(14, 34)), rng.uniform(1.35, 2.2)
     inner = 1.5 * wire
