@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import re
 import shlex
@@ -15,6 +16,7 @@ import numpy as np
 import pytest
 
 from fsid.cli.main import COMMANDS, main
+from fsid.dataset import read_member
 from fsid.dataset.index import index_mosaics
 from fsid.evaluate import read_testset
 from fsid.sensor import Raw, load_profile, noisy_from_clean, pack, read_raw, to_dn, write_dng
@@ -164,8 +166,9 @@ def test_the_python_of_the_guide_to_stereo_makes_a_pair_whose_labels_lead_from_o
     """Runs after the guides: one of them writes the scene."""
     monkeypatch.chdir(desk)
     text = (REPOSITORY / "docs" / "stereo-and-labels.md").read_text(encoding="utf-8")
-    (block,) = re.findall(r"```python\n(.*?)```", text, re.S)
-    exec(compile(block, "stereo-and-labels.md", "exec"), {})
+    block, of_pairs = re.findall(r"```python\n(.*?)```", text, re.S)
+    names: dict[str, Any] = {}
+    exec(compile(block, "stereo-and-labels.md", "exec"), names)
     with np.load("pair.npz") as pair:
         left, right, disparity, visible = (pair[k] for k in ("left", "right", "disparity", "visible"))
     assert 0.6 < visible.mean() < 1
@@ -173,6 +176,12 @@ def test_the_python_of_the_guide_to_stereo_makes_a_pair_whose_labels_lead_from_o
     there = np.rint(columns - disparity).astype(int).clip(0, visible.shape[1] - 1)
     apart = np.abs(right[rows, there] - left)[visible].mean()
     assert apart < 0.25 * np.abs(right - left)[visible].mean()
+    exec(compile(of_pairs.replace('"data"', '"many"'), "stereo-and-labels.md", "exec"), names)  # has crops
+    clean = read_raw(io.BytesIO(read_member(names["shard"], f"{names['key']}.clean.dng")))
+    with np.load(f"{names['key']}.labels.npz") as labels:
+        assert labels["depth"].shape == labels["object_id"].shape == clean.mosaic.shape
+    light, seen = names["frame"].radiance[names["window"]][::2, ::2, 1], pack(clean.mosaic, clean.cfa)[1]
+    assert np.corrcoef(np.sqrt(light.ravel()), np.sqrt(seen.clip(0).ravel()))[0, 1] > 0.8
 
 
 def test_the_python_for_bare_mosaics_makes_captures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
