@@ -95,7 +95,7 @@ def test_the_larger_camera_is_the_same_lens() -> None:
 
 def test_a_scene_is_what_lenses_of_other_focal_lengths_see() -> None:
     """Red and blue of one each, behind a point spread of a pixel; green and labels as without fringes."""
-    scene = sample(SceneConfig(objects=(12, 12)), 4, width=240, height=136)
+    scene = sample(SceneConfig(objects=(12, 12)), 2, width=240, height=136)  # few details finer than a pixel
     eye = scene.cameras[0]
     camera = Camera(eye.position_m, eye.target_m, eye.up, eye.fov_deg, eye.width, eye.height, softness_px=1.0)
     with Renderer(texture_size=64) as renderer:
