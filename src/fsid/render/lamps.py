@@ -88,14 +88,11 @@ def _hood_apart(drawable: Drawable) -> list[Drawable]:
     balls = [_extent(drawable, part) for part in lamps if part not in displays]
     hood = np.zeros(len(drawable.materials), bool)
     hood[parts] = [_is_hood(drawable, part, balls) for part in parts]
-    shining = replace(_pieces(drawable, ~hood), displays=_renumbered(displays, ~hood))
-    return [shining, _pieces(drawable, hood)] if hood.any() else [replace(drawable, displays=displays)]
-
-
-def _renumbered(displays: dict[int, Display], wanted: np.ndarray) -> dict[int, Display]:
-    """The same by the numbers that their parts have in `_pieces`."""
-    number = np.cumsum(wanted) - 1
-    return {int(number[part]): display for part, display in displays.items()}
+    if not hood.any():
+        return [replace(drawable, displays=displays)]
+    number = np.cumsum(~hood) - 1  # of each part among those that are no hood
+    displays = {int(number[part]): display for part, display in displays.items()}
+    return [replace(_pieces(drawable, ~hood), displays=displays), _pieces(drawable, hood)]
 
 
 def _is_hood(drawable: Drawable, part: int, balls: Sequence[tuple[np.ndarray, float]]) -> bool:
@@ -126,7 +123,7 @@ def _display(drawable: Drawable, part: int) -> Display | None:
     others = [p for p in np.unique(drawable.mesh.face_parts) if _is_opaque(drawable.materials[p])]
     solid = np.concatenate([np.empty((0, 3, 3)), *(_triangles(drawable, p) for p in others)])
     for ahead in (axes[:, 2], -axes[:, 2]):
-        front = normals @ ahead > 0.5 * np.sqrt(_FLAT)
+        front = normals @ ahead > 0.5
         if not front.any():
             continue
         display = _rectangle(triangles[front], areas[front], ahead)
