@@ -31,7 +31,7 @@ def picture_rand(rng: np.random.Generator, height: int, width: int, kind: str | 
     rng = branch(rng)
     chosen = kind or str(rng.choice(KINDS))
     longer = max(height, width)
-    fine = 1 << max((63 // longer).bit_length(), 0)
+    fine = 1 << (63 // longer).bit_length()
     size = 1 << (fine * longer - 1).bit_length()
     make = {
         "landscape": _landscape,
