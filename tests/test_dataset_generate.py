@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 import tarfile
+import weakref
 from dataclasses import replace
 from pathlib import Path
 
@@ -36,7 +37,10 @@ from fsid.dataset import (
     shard_path,
     write_shard,
 )
+from fsid.dataset.generate import _Shard
+from fsid.dataset.sample import Sample
 from fsid.dataset.shards import read_samples
+from fsid.dataset.worker import Worker
 from fsid.errors import FsidError
 from fsid.sensor import NoiseTerms, load_profile, save_profile
 from fsid.sensor.light import LONGEST_EXPOSURE_S
@@ -89,6 +93,22 @@ def test_a_shard_that_was_cut_between_two_files_is_made_again(scenes: Path, tmp_
     path.write_bytes(whole[:end])
     assert generate(out, small(), count=4, seed=7, shard_size=2) == 1
     assert path.read_bytes() == whole
+
+
+def test_a_frame_is_let_go_before_the_next_is_made(photos: Path, tmp_path: Path, monkeypatch):
+    """A frame of full HD and its files would take 30 MB while the next one is rendered."""
+    made: list[weakref.ref[Sample]] = []
+
+    def frame_alone(*arguments) -> list[Sample]:
+        assert all(sample() is None for sample in made)
+        samples = make_frame(*arguments)
+        made.extend(map(weakref.ref, samples))
+        return samples
+
+    monkeypatch.setattr(sys.modules[_Shard.__module__], "make_frame", frame_alone)
+    config = small("width=64", "height=48", f"images={photos}")
+    _Shard(shard_path(tmp_path, 0), 0, range(3), dataset_config(config, 0, 3)).do(Worker(None, {}))
+    assert len(made) == 3
 
 
 def test_a_larger_count_keeps_the_whole_frames_of_a_shard_that_was_not_full(photos: Path, tmp_path: Path):

@@ -5,12 +5,13 @@ from __future__ import annotations
 import errno
 import io
 import tarfile
+import weakref
 from pathlib import Path
 
 import pytest
 
 from fsid.dataset import read_member, shard_keys, shard_path, write_shard
-from fsid.dataset.shards import find_shards, read_samples
+from fsid.dataset.shards import each_sample, find_shards, read_samples
 from fsid.errors import FsidError
 
 
@@ -37,6 +38,29 @@ def test_equal_samples_give_equal_bytes(tmp_path: Path):
     for name in ("x.tar", "y.tar"):
         write_shard(tmp_path / name, [("a", {"json": b"1"})])
     assert (tmp_path / "x.tar").read_bytes() == (tmp_path / "y.tar").read_bytes()
+
+
+def test_a_sample_is_let_go_before_the_next_is_asked_for(tmp_path: Path):
+    """The next one is rendered, which needs the memory."""
+
+    class Files(dict[str, bytes]):
+        pass
+
+    def samples(left: list[weakref.ref[Files]]):
+        for key in ("a", "b", "c"):
+            assert all(files() is None for files in left)
+            made = [Files(json=b"{}")]
+            left.append(weakref.ref(made[0]))
+            yield key, made.pop()
+
+    write_shard(tmp_path / "x.tar", samples([]))
+    assert shard_keys(tmp_path / "x.tar") == ["a", "b", "c"]
+
+
+def test_samples_come_one_after_the_other_as_they_come_together(tmp_path: Path):
+    path = tmp_path / "x.tar"
+    write_shard(path, [("a", {"json": b"1", "clean.dng": b"22"}), ("b", {"json": b"3"})])
+    assert dict(each_sample(path)) == read_samples(path)
 
 
 def test_a_failing_sample_leaves_nothing(tmp_path: Path):

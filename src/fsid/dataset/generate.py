@@ -25,8 +25,8 @@ from fsid.dataset.crew import Crew, LocalCrew, run
 from fsid.dataset.pictures import find_pictures, pictures_digest
 from fsid.dataset.sample import encode, make_frame
 from fsid.dataset.settle import Settle, settle
-from fsid.dataset.shards import count_whole, read_samples, remove_parts, shard_path, write_shard
-from fsid.dataset.tasks import check_cameras, check_task
+from fsid.dataset.shards import count_whole, each_sample, remove_parts, shard_path, write_shard
+from fsid.dataset.tasks import SceneRenderer, check_cameras, check_task
 from fsid.dataset.worker import Worker
 from fsid.errors import FsidError
 from fsid.files import held
@@ -82,7 +82,7 @@ class _Shard:
 
     def do(self, worker: Worker) -> int:
         """Write the shard; number of its new samples."""
-        kept = list(read_samples(self.path).items())[: self.kept] if self.kept else []
+        kept = itertools.islice(each_sample(self.path), self.kept) if self.kept else ()
         write_shard(self.path, itertools.chain(kept, self._samples(worker)))
         return len(self.indices)
 
@@ -90,9 +90,16 @@ class _Shard:
         config = self.dataset.generate
         first, last = (index // config.pairs_per_frame for index in (self.indices[0], self.indices[-1]))
         for frame in range(first, last + 1):
-            for sample in make_frame(config, self.dataset.seed, frame, worker.renderer(config)):
-                if sample.record["index"] in self.indices:
-                    yield sample.key, encode(sample)
+            yield from self._samples_of(frame, worker.renderer(config))
+
+    def _samples_of(
+        self, frame: int, renderer: SceneRenderer | None
+    ) -> Iterator[tuple[str, dict[str, bytes]]]:
+        """Nothing of a frame is left when the next one is rendered, which needs the memory."""
+        config = self.dataset.generate
+        for sample in make_frame(config, self.dataset.seed, frame, renderer):
+            if sample.record["index"] in self.indices:
+                yield sample.key, encode(sample)
 
 
 def generate(
