@@ -68,6 +68,16 @@ def test_radiance_alone_is_that_of_the_frame(renderer: Renderer, config: SceneCo
     assert (renderer.radiance(drawn) == renderer.render(drawn).radiance).all()
 
 
+def test_radiance_alone_is_that_of_the_frame_through_glass(renderer: Renderer) -> None:
+    """Where labels are not wanted there are no images of them, neither of what is drawn nor behind it."""
+    drawn = sample(CONFIG, 4, width=96, height=64)
+    clear = [tuple(replace(part, transmission=0.7) for part in parts) for parts in drawn.materials]
+    glass = replace(drawn, materials=tuple(clear))
+    frame = renderer.render(glass)
+    assert (frame.radiance != renderer.render(drawn).radiance).any()
+    assert (renderer.radiance(glass) == frame.radiance).all()
+
+
 def test_slots_of_materials_do_not_matter(renderer: Renderer) -> None:
     """With room for a few layers only, materials move between slots and are baked again."""
     first = fingerprint(renderer.render(scene(1)))

@@ -212,8 +212,9 @@ class Renderer:
         view = replace(view, camera=camera, drawables=hoods_apart(view.drawables))
         shot = Shot(lens_of(camera), camera.time_s, shift_px)
         bake = bake or self._bake
-        self._draw(view, shot, bake, mark)
-        frame = self._targets.read_frame(labels=labels or is_moving(camera, view.drawables))
+        labels = labels or is_moving(camera, view.drawables)
+        self._draw(view, shot, bake, mark, labels=labels)
+        frame = self._targets.read_frame(labels=labels)
         mark("readback")
         most, places = self._quality.shots, self._lens_images
         shots = shots_of(camera, view.drawables, frame, shot, self._label_sample, most, places)
@@ -224,7 +225,7 @@ class Renderer:
         elif shots:
             radiance = np.zeros_like(radiance)
             for part in shots:
-                self._draw(view, part, bake, mark)
+                self._draw(view, part, bake, mark, labels=labels)
                 radiance += _through_lens(part, camera, focal_px, *self._targets.read_radiance())
             radiance /= np.float32(len(shots))
         radiance = magnified(radiance, asked, margin)
@@ -237,12 +238,12 @@ class Renderer:
         """Return when everything issued so far is done; only measuring needs it."""
         self._context.finish()
 
-    def _draw(self, view: View, shot: Shot, bake: Bake, mark: Mark) -> None:
+    def _draw(self, view: View, shot: Shot, bake: Bake, mark: Mark, *, labels: bool) -> None:
         """All passes over a view; the result stays in the targets."""
         layers = self._load_layers(view, bake)
         stage = stage_of(view, layers, shot.time_s, self._quality.shadow_px)
         mark("scene build")
-        self._targets.resize((view.camera.width, view.camera.height), shot.lens.seen_px)
+        self._targets.resize((view.camera.width, view.camera.height), shot.lens.seen_px, labels=labels)
         self._shadows.resize(stage.plan)
         buffers = Buffers(self._context, stage, compute=self._compute)
         stage = replace(stage, geometry=stage.geometry.without_vertices())
@@ -268,7 +269,7 @@ class Renderer:
             buffers.release()
             for targets in self._mirror_targets:
                 targets.release()
-            self._targets.release_glass()
+            self._targets.release_passing()
             if not self._on_gpu:
                 return_free_blocks()
 
@@ -303,7 +304,7 @@ class Renderer:
     def _draw_mirror(self, targets: Targets, stage: Stage, buffers: Buffers, mirror: Mirror) -> None:
         """The image that a mirror shows, with what lies behind it cut off."""
         shot, size = mirror.shot, mirror.shot.lens.seen_px
-        targets.resize(size, size)
+        targets.resize(size, size, labels=False)
         camera = replace(stage.view.camera, width=size[0], vignetting=ZERO)
         stage = replace(stage, view=replace(stage.view, camera=camera))
         self._samples.draw(targets, stage, buffers, shot, kept=mirror.kept)

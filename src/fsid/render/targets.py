@@ -24,7 +24,8 @@ _COLOUR, _DEPTH = 0x1800, 0x1801
 class Targets:
     """G-buffer of grid^2 samples per pixel (20 bytes each), occlusion per 2 x 2 pixels, result per pixel.
 
-    compute: whether the programs that fill them are compute shaders. What `begin_...` returns is to be drawn.
+    compute: whether the programs that fill them are compute shaders, which store labels always: what a
+    fragment shader writes where there is no image is dropped. What `begin_...` returns is to be drawn.
     """
 
     def __init__(self, context: moderngl.Context, grid: int, mips: MipLevels, *, compute: bool) -> None:
@@ -40,10 +41,13 @@ class Targets:
         self._lit_rows = 0
         self.block_lights = 0
         self.size = self.seen = (0, 0)
+        self._labels = True
 
-    def resize(self, size: tuple[int, int], seen: tuple[int, int]) -> None:
-        """Make the images for `size` pixels and a G-buffer of `seen` pixels, unless they are there."""
-        if (self.size, self.seen) == (size, seen):
+    def resize(self, size: tuple[int, int], seen: tuple[int, int], *, labels: bool) -> None:
+        """Make the images for `size` pixels and a G-buffer of `seen` pixels, unless they are there. labels:
+        whether the result has albedo, normal and id besides radiance and depth."""
+        labels = labels or self._compute
+        if (self.size, self.seen, self._labels) == (size, seen, labels):
             return
         self._limit = int(self._context.info["GL_MAX_TEXTURE_SIZE"])
         limit = self._limit // self._grid
@@ -53,7 +57,7 @@ class Targets:
                     f"image size {width} x {height}: this driver draws 1 .. {limit} pixels a side"
                 )
         self.release()
-        self.size, self.seen = size, seen
+        self.size, self.seen, self._labels = size, seen, labels
         context, large = self._context, (seen[0] * self._grid, seen[1] * self._grid)
         self.blocks = (-(-seen[0] // 2), -(-seen[1] // 2))
         self._samples = context.texture(large, 4, dtype="u4")
@@ -176,8 +180,9 @@ class Targets:
         return self._over(0)
 
     def _over(self, result: int) -> Canvas:
-        """One of the two results; units 11 to 13 hold the other."""
-        for unit, texture in zip((11, 12, 13), self._results[1 - result].images, strict=True):
+        """One of the two results; units 11 to 13 hold the other, or three times one that has no labels."""
+        radiance, *labels = self._results[1 - result].images
+        for unit, texture in zip((11, 12, 13), [radiance, *(labels or [radiance] * 2)], strict=True):
             texture.use(unit)
         return self._results[result]
 
@@ -222,10 +227,11 @@ class Targets:
                 strip = texels[first : first + _STRIP]
                 yield slice(top + first, top + first + len(strip)), strip
 
-    def release_glass(self) -> None:
-        """Free what only `begin_glass` needs."""
+    def release_passing(self) -> None:
+        """Free what is needed no longer when the result is drawn, and is made in little time."""
         _release_all(self._results[1:])
         del self._results[1:]
+        self._release_lit()
 
     def release(self) -> None:
         """Free the images."""
@@ -239,7 +245,7 @@ class Targets:
     def _result(self) -> Canvas:
         """Radiance and depth; albedo and id; normal; with the marks."""
         radiance = self._context.texture(self.size, 4, dtype="f4")
-        labels = [self._context.texture(self.size, 4, dtype="nu2") for _ in range(2)]
+        labels = [self._context.texture(self.size, 4, dtype="nu2") for _ in range(2 * self._labels)]
         radiance.repeat_x = radiance.repeat_y = False
         for label in labels:
             label.filter = (moderngl.NEAREST, moderngl.NEAREST)
