@@ -178,11 +178,6 @@ class LocalCrew:
     def size(self) -> int:
         return self._size
 
-    @property
-    def pids(self) -> list[int]:
-        """Process ids of the workers."""
-        return [process.pid for process, _ in self._members.values() if process.pid is not None]
-
     def start(self, worker: int) -> None:
         if worker in self._members:
             self._members.pop(worker)[1].close()  # it ends at the end of its input
