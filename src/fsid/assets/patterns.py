@@ -32,6 +32,14 @@ def axes(size: int) -> tuple[np.ndarray, np.ndarray]:
     return t[None, :], t[:, None]
 
 
+def grid(size: int, u_count: int, v_count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """(x, y, i, j) of `u_count` x `v_count` cells: where in its cell a texel is, -0.5..0.5, and the cell's
+    numbers; x and i (1, S), y and j (S, 1), to broadcast against each other."""
+    u, v = axes(size)
+    x, y = u * u_count, v * v_count
+    return x % 1 - 0.5, y % 1 - 0.5, np.floor(x).astype(int), np.floor(y).astype(int)
+
+
 def noise(
     rng: np.random.Generator,
     size: int,

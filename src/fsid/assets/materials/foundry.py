@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fsid.assets.material_registry import Layers, material_family
-from fsid.assets.patterns import axes, cells, edge, level, noise, scratches
+from fsid.assets.patterns import axes, cells, edge, grid, level, noise, scratches
 
 
 @material_family(
@@ -62,10 +62,7 @@ def anodised_metal(rng: np.random.Generator, variant: int, size: int) -> Layers:
 def checker_plate(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """Floor plate with raised lozenges in turn, worn bright on top, grime between; dots for variant 2."""
     count = (10, 14, 16, 8)[variant]
-    u, v = axes(size)
-    x, y = u * count + 0 * v, v * count + 0 * u
-    i, j = np.floor(x).astype(int), np.floor(y).astype(int)
-    a, b = x % 1 - 0.5, y % 1 - 0.5
+    a, b, i, j = grid(size, count, count)
     flip = (i + j) % 2 == 0
     p, q = (a + b) / np.sqrt(2), (a - b) / np.sqrt(2)
     along, across = np.where(flip, p, q), np.where(flip, q, p)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fsid.assets.material_registry import Layers, material_family
-from fsid.assets.patterns import axes, cells, edge, joint, level, noise, scratches
+from fsid.assets.patterns import axes, cells, edge, grid, joint, level, noise, scratches
 
 
 @material_family(
@@ -150,10 +150,7 @@ def brick(rng: np.random.Generator, variant: int, size: int) -> Layers:
 def tiles(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """Glazed tiles with grout: plain, mosaic, quarter-circle (Truchet) and star motifs."""
     count = (6, 24, 8, 6)[variant]
-    u, v = axes(size)
-    x, y = u * count, v * count
-    i, j = np.floor(x).astype(int), np.floor(y).astype(int)
-    x, y = x % 1 - 0.5, y % 1 - 0.5
+    x, y, i, j = grid(size, count, count)
     shade = rng.random((count, count))[j, i]
     grout = joint(np.maximum(np.abs(x), np.abs(y)), 0.478, 0.02, count / size)
     flip = rng.random((count, count))[j, i] < 0.5

@@ -5,27 +5,20 @@ from __future__ import annotations
 import numpy as np
 
 from fsid.assets.material_registry import Layers, material_family
-from fsid.assets.patterns import axes, edge, level, noise
-
-
-def _grid(size: int, u_count: int, v_count: int) -> tuple[np.ndarray, ...]:
-    """Cell coordinates -0.5..0.5 and cell numbers along u and v, broadcastable."""
-    u, v = axes(size)
-    x, y = u * u_count, v * v_count
-    return x % 1 - 0.5, y % 1 - 0.5, np.floor(x).astype(int), np.floor(y).astype(int)
+from fsid.assets.patterns import axes, edge, grid, level, noise
 
 
 @material_family("lace", tile_m=0.2, relief_m=0.0008, colours="2a2228 3f343c f2ece2")
 def lace(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """A white net over a dark ground with dense flowers, scallops and picots."""
     mesh = (40, 56, 72, 30)[variant]
-    x, y, _, j = _grid(size, mesh, mesh)
+    x, y, _, j = grid(size, mesh, mesh)
     x = x + 0 * y
     shifted = np.where(j % 2 == 0, x, (x + 1.0) % 1 - 0.5)
     ring = np.abs(np.hypot(shifted, y) - 0.42)
     net = edge(0.09 - ring, 0, 0.06)
     count = (3, 4, 5, 2)[variant]
-    a, b, _, _ = _grid(size, count, count)
+    a, b, _, _ = grid(size, count, count)
     a, b = a + 0 * b, b + 0 * a
     radius, angle = np.hypot(a, b), np.arctan2(b, a)
     petals = int(rng.integers(5, 9))
@@ -50,7 +43,7 @@ def lace(rng: np.random.Generator, variant: int, size: int) -> Layers:
 def embroidery(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """Cross-stitch charts or satin-stitch blossoms on linen."""
     threads = (80, 96, 64, 110)[variant]
-    x, y, i, j = _grid(size, threads, threads)
+    x, y, i, j = grid(size, threads, threads)
     weave = np.sqrt(np.clip(1 - np.minimum(2 * np.abs(x), 2 * np.abs(y)) ** 2, 0, 1)) * (
         (i + j) % 2 * 0.2 + 0.8
     )
@@ -63,7 +56,7 @@ def embroidery(rng: np.random.Generator, variant: int, size: int) -> Layers:
         thread, first = stitch * cross, (i // len(tile) + j // len(tile)) % 2 == 0
     else:
         count = (3, 4, 3, 6)[variant]
-        a, b, p, q = _grid(size, count, count)
+        a, b, p, q = grid(size, count, count)
         a, b = a + 0 * b, b + 0 * a
         angle, radius = np.arctan2(b, a), np.hypot(a, b)
         shape = edge(0.26 + 0.14 * np.cos(int(rng.integers(4, 8)) * angle) - radius, 0, 0.015)
@@ -93,7 +86,7 @@ def embroidery(rng: np.random.Generator, variant: int, size: int) -> Layers:
 def thread_spools(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """Rows of wound yarn cylinders of many colours: fine helical lines on round bodies."""
     columns, rows = ((8, 4), (12, 6), (6, 3), (16, 6))[variant]
-    x, y, i, j = _grid(size, columns, rows)
+    x, y, i, j = grid(size, columns, rows)
     x, y = x + 0 * y, y + 0 * x
     body = np.sqrt(np.clip(1 - (2.08 * x) ** 2, 0, 1))
     spool = (np.abs(y) < 0.44) * (np.abs(x) < 0.48)
@@ -119,7 +112,7 @@ def thread_spools(rng: np.random.Generator, variant: int, size: int) -> Layers:
 def crochet(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """Yarn in rosettes and chains with holes between: granny squares, shells."""
     count = (3, 5, 4, 7)[variant]
-    x, y, _, _ = _grid(size, count, count)
+    x, y, _, _ = grid(size, count, count)
     x, y = x + 0 * y, y + 0 * x
     square = np.maximum(np.abs(x), np.abs(y)) if variant % 2 == 0 else np.hypot(x, y)
     rounds = (7, 6, 9, 5)[variant]
@@ -144,7 +137,7 @@ def crochet(rng: np.random.Generator, variant: int, size: int) -> Layers:
 def ribbons(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """Plaited bands over and under each other, each with its own stripe: straps, baskets, webbing."""
     count = (6, 12, 8, 16)[variant]
-    x, y, i, j = _grid(size, count, count)
+    x, y, i, j = grid(size, count, count)
     x, y = x + 0 * y, y + 0 * x
     over = (i + j) % 2 == 0 if variant % 2 == 0 else (i + 2 * j) % 4 < 2
     across, along = np.where(over, x, y), np.where(over, y, x)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fsid.assets.material_registry import Layers, material_family
-from fsid.assets.patterns import axes, cells, edge, joint, level, noise, shade, stack, warp
+from fsid.assets.patterns import axes, cells, edge, grid, joint, level, noise, shade, stack, warp
 
 
 @material_family("plywood", tile_m=0.8, relief_m=0.0006, colours="d9b98a c79c63 8a6238")
@@ -124,13 +124,11 @@ def peeling_paint(rng: np.random.Generator, variant: int, size: int) -> Layers:
 def end_grain(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """Butcher's block: sawn ends with arcs of rings, rays and checks."""
     count = (4, 6, 8, 3)[variant]
-    u, v = axes(size)
-    x, y = u * count + 0 * v, v * count + 0 * u
-    i, j = np.floor(x).astype(int), np.floor(y).astype(int)
+    x, y, i, j = grid(size, count, count)
     centre = rng.uniform(-1.2, 1.2, (2, count, count))[:, j, i]
     pitch = rng.uniform(9, 20, (count, count))[j, i]
     tone = rng.random((count, count))[j, i]
-    dx, dy = x % 1 - 0.5 - centre[0], y % 1 - 0.5 - centre[1]
+    dx, dy = x - centre[0], y - centre[1]
     wobble = noise(rng, size, 1.8, low=2) * 0.03
     radius = np.hypot(dx, dy) + wobble
     ring = (radius * pitch) % 1
@@ -138,7 +136,7 @@ def end_grain(rng: np.random.Generator, variant: int, size: int) -> Layers:
     angle = np.arctan2(dy, dx)
     rays = level(noise(rng, size, 0.8, low=size / 20) - 1, 0.5) * (0.5 + 0.5 * np.cos(160 * angle))
     check = edge(np.cos(angle * 3 + 6 * tone), 0.9985, 0.002) * edge(noise(rng, size, 1.6), 0.6, 0.3)
-    to_side = np.maximum(np.abs(x % 1 - 0.5), np.abs(y % 1 - 0.5))
+    to_side = np.maximum(np.abs(x), np.abs(y))
     gap = joint(to_side, 0.488, 0.012, count / size)
     return Layers(
         mix=np.clip(0.6 * late + 0.5 * tone, 0, 1),
