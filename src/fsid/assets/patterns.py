@@ -234,6 +234,12 @@ def scratches(
     return ink(size, [mark(k) for k in range(count)])
 
 
+def turned(outline: np.ndarray, angle: float) -> np.ndarray:
+    """An outline (n, 2) turned by `angle` radians about the origin."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.asarray(outline @ np.array([[c, s], [-s, c]]))
+
+
 def stack(size: int, outlines: Sequence[np.ndarray]) -> np.ndarray:
     """(2S, 2S) int32: which polygon lies on top, 0 for none, k + 1 for outlines[k], later ones above.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fsid.assets.material_registry import Layers, material_family
-from fsid.assets.patterns import axes, cells, edge, level, noise, shade, stack, warp
+from fsid.assets.patterns import axes, cells, edge, level, noise, shade, stack, turned, warp
 
 
 def _leaf_outlines(
@@ -20,9 +20,7 @@ def _leaf_outlines(
         arc = rng.normal(0, bend) * long * (t - t * t)
         side = half * width * rng.uniform(0.6, 1.3) * long
         shape = np.r_[np.c_[t * long, arc + side], np.c_[t * long, arc - side][::-1]]
-        angle = rng.uniform(0, 2 * np.pi)
-        c, s = np.cos(angle), np.sin(angle)
-        out.append(shape @ np.array([[c, s], [-s, c]]) + rng.random(2))
+        out.append(turned(shape, rng.uniform(0, 2 * np.pi)) + rng.random(2))
     return out
 
 
@@ -106,8 +104,7 @@ def dead_leaves(rng: np.random.Generator, variant: int, size: int) -> Layers:
     outlines = []
     for r in radius:
         turn = rng.uniform(0, 2 * np.pi)
-        c, s = np.cos(turn), np.sin(turn)
-        outlines.append((unit * (r, r * rng.uniform(0.4, 1))) @ np.array([[c, s], [-s, c]]) + rng.random(2))
+        outlines.append(turned(unit * (r, r * rng.uniform(0.4, 1)), turn) + rng.random(2))
     index = stack(size, outlines)
     hue = rng.random(count)
     grain = noise(rng, size, 0.5, low=size / 16)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fsid.assets.material_registry import Layers, material_family, pictured
-from fsid.assets.patterns import cells, edge, level, noise, shade, stack, warp
+from fsid.assets.patterns import cells, edge, level, noise, shade, stack, turned, warp
 
 
 def _leaves(
@@ -125,8 +125,7 @@ def straw(rng: np.random.Generator, variant: int, size: int) -> Layers:
             length / 2,
             width * rng.uniform(0.5, 1.3) / 2,
         )
-        c, s = np.cos(turn), np.sin(turn)
-        outlines.append(half @ np.array([[c, s], [-s, c]]) + rng.random(2))
+        outlines.append(turned(half, turn) + rng.random(2))
     index = stack(size, outlines)
     depth, tone = shade(index, np.linspace(0.05, 1, count)), shade(index, rng.random(count))
     fibre = noise(rng, size, 0.7, low=size / 24)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fsid.assets.material_registry import Layers, material_family
-from fsid.assets.patterns import axes, cells, edge, grid, joint, level, noise, shade, stack, warp
+from fsid.assets.patterns import axes, cells, edge, grid, joint, level, noise, shade, stack, turned, warp
 
 
 @material_family("plywood", tile_m=0.8, relief_m=0.0006, colours="d9b98a c79c63 8a6238")
@@ -74,8 +74,7 @@ def chipboard(rng: np.random.Generator, variant: int, size: int) -> Layers:
         strict=True,
     ):
         corners = np.array(((-1, -0.7), (0.9, -1), (1, 0.8), (-0.8, 1))) * (length, length * width) / 2
-        c, s = np.cos(turn), np.sin(turn)
-        outlines.append(corners @ np.array([[c, s], [-s, c]]) + (x, y))
+        outlines.append(turned(corners, turn) + np.array((x, y)))
     index = stack(size, outlines)
     tone = shade(index, rng.random(count), 0.5)
     knotted = shade(index, (rng.random(count) > 0.93).astype(float))
