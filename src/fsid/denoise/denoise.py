@@ -26,7 +26,7 @@ from fsid.denoise.model import ModelCard
 from fsid.errors import FsidError
 from fsid.sensor.light import GREY
 from fsid.sensor.mosaic import pack, site_offsets, unpack
-from fsid.sensor.raw import NoiseLevel, Raw
+from fsid.sensor.raw import NoiseLevel, Raw, four
 
 MAX_STRENGTH = 100.0
 MAX_TOLD = 0.0036
@@ -108,12 +108,7 @@ def _at_grey(level: NoiseLevel) -> float:
 def _stronger(level: NoiseLevel, times: float) -> NoiseLevel:
     """Of so many times the variance, or as many as `MAX_TOLD` allows."""
     times = min(times, max(MAX_TOLD / max(_at_grey(level), 1e-12), 1.0))
-    return NoiseLevel(_times(level.k, times), _times(level.sigma2, times))
-
-
-def _times(values: tuple[float, float, float, float], factor: float) -> tuple[float, float, float, float]:
-    a, b, c, d = (factor * value for value in values)
-    return a, b, c, d
+    return NoiseLevel(four(times * value for value in level.k), four(times * value for value in level.sigma2))
 
 
 def check_raw(raw: object) -> None:

@@ -26,7 +26,7 @@ from scipy.special import gammaincinv
 from fsid.errors import FsidError
 from fsid.sensor.mosaic import site_offsets
 from fsid.sensor.quantise import ROUNDING_DN2
-from fsid.sensor.raw import NoiseLevel, Raw
+from fsid.sensor.raw import NoiseLevel, Raw, four
 
 SITE_SPREAD = (0.1, 0.3)  # relative, of k and sigma2: twelve published phones
 LINEAR_SHARE = 0.9  # of the range; brighter blocks are near saturation
@@ -118,7 +118,7 @@ def estimate_noise(raw: Raw) -> NoiseEstimate:
     )
     sites = [_site_line(_pools(site, line), line, errors, floor) for site in blocks]
     (k, sigma2), (k_error, sigma2_error) = np.transpose(sites, (1, 2, 0))
-    return NoiseEstimate(NoiseLevel(_four(k), _four(sigma2)), _four(k_error), _four(sigma2_error))
+    return NoiseEstimate(NoiseLevel(four(k), four(sigma2)), four(k_error), four(sigma2_error))
 
 
 def _blocks(plane: np.ndarray) -> _Blocks:
@@ -206,8 +206,3 @@ def _site_line(
     values = np.concatenate([pools.variance * root, line / prior])
     found, *_ = np.linalg.lstsq(rows, values, rcond=None)
     return np.maximum(found, (0, floor)), np.sqrt(np.diag(np.linalg.inv(rows.T @ rows)))
-
-
-def _four(values: np.ndarray) -> tuple[float, float, float, float]:
-    a, b, c, d = (float(v) for v in values)
-    return a, b, c, d

@@ -18,7 +18,7 @@ import numpy as np
 from fsid.errors import FsidError
 from fsid.sensor.iso_law import IsoCurve, k_curve, sigma2_curve
 from fsid.sensor.quantise import ROUNDING_DN2
-from fsid.sensor.raw import NoiseLevel
+from fsid.sensor.raw import NoiseLevel, four
 from fsid.sensor.terms import PAPER, NoiseTerms
 
 MONO = "MONO"  # stands in `cfa` for a sensor without colour filters; its four sites are alike
@@ -112,7 +112,7 @@ class CameraProfile:
         if not (np.isfinite(iso) and iso > 0):
             raise FsidError(f"profile {self.name}: ISO {iso} is not a positive number")
         k, sigma2 = self.curves
-        return NoiseLevel(k=_four(k(iso)), sigma2=_four(sigma2(iso)))
+        return NoiseLevel(k=four(k(iso)), sigma2=four(sigma2(iso)))
 
     @cached_property
     def curves(self) -> tuple[IsoCurve, IsoCurve]:
@@ -124,8 +124,3 @@ class CameraProfile:
             k_curve(iso, self.k, self.measured.k_error),
             sigma2_curve(iso, self.sigma2, floor, self.measured.sigma2_error),
         )
-
-
-def _four(values: np.ndarray) -> tuple[float, float, float, float]:
-    a, b, c, d = (float(v) for v in values)
-    return a, b, c, d

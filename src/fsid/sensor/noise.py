@@ -23,7 +23,7 @@ from fsid.sensor.gaussian import standard_normal
 from fsid.sensor.mosaic import site_offsets
 from fsid.sensor.profiles import CameraProfile
 from fsid.sensor.quantise import ROUNDING_DN2
-from fsid.sensor.raw import NoiseLevel, Raw, check_even
+from fsid.sensor.raw import NoiseLevel, Raw, check_even, four
 
 K_JITTER = 0.05  # relative sigma: conversion gain from unit to unit, and vendors' rounding of ISO
 _BLOCK_PIXELS = 1 << 17
@@ -70,8 +70,7 @@ def before_converter(level: NoiseLevel, span: float) -> NoiseLevel:
     """`level` of stored data without the rounding to 1 / span, span = white - black in DN; sigma2 >= 0."""
     level.check()
     rounding = ROUNDING_DN2 / span**2
-    r, gr, gb, b = (max(value - rounding, 0.0) for value in level.sigma2)
-    return NoiseLevel(k=level.k, sigma2=(r, gr, gb, b))
+    return NoiseLevel(k=level.k, sigma2=four(max(value - rounding, 0.0) for value in level.sigma2))
 
 
 def level_rand(
@@ -89,8 +88,8 @@ def level_rand(
     iso = float(np.exp(rng.uniform(np.log(low), np.log(high))))
     k_factor, sigma2_factor = np.exp(rng.normal(0.0, (K_JITTER, SIGMA2_JITTER)))
     level, floor = profile.level(iso), ROUNDING_DN2 / profile.span**2
-    r, gr, gb, b = (max(value, floor) for value in _scaled(level.sigma2, float(sigma2_factor)))
-    return iso, NoiseLevel(k=_scaled(level.k, float(k_factor)), sigma2=(r, gr, gb, b))
+    sigma2 = four(max(value * sigma2_factor, floor) for value in level.sigma2)
+    return iso, NoiseLevel(k=four(value * k_factor for value in level.k), sigma2=sigma2)
 
 
 def _rows(level: NoiseLevel, cfa: str, width: int) -> tuple[np.ndarray, np.ndarray]:
@@ -100,8 +99,3 @@ def _rows(level: NoiseLevel, cfa: str, width: int) -> tuple[np.ndarray, np.ndarr
         rows[0, r, c::2] = k
         rows[1, r, c::2] = sigma2
     return rows[0], rows[1]
-
-
-def _scaled(values: tuple[float, float, float, float], factor: float) -> tuple[float, float, float, float]:
-    a, b, c, d = values
-    return a * factor, b * factor, c * factor, d * factor

@@ -9,6 +9,7 @@ the network would learn the bias. Var(x) is that of stored data: rounding is a p
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,6 +19,12 @@ from fsid.errors import FsidError
 from fsid.sensor.metadata import Metadata
 
 CFA_PATTERNS = ("RGGB", "BGGR", "GRBG", "GBRG")
+
+
+def four(values: Iterable[float]) -> tuple[float, float, float, float]:
+    """A number of each CFA site as plain floats; ValueError where they are not four."""
+    r, gr, gb, b = (float(value) for value in values)
+    return r, gr, gb, b
 
 
 @dataclass(frozen=True)
