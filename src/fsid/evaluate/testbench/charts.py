@@ -8,7 +8,7 @@ from importlib.resources import as_file, files
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from fsid.evaluate.testbench.surface import Surface, dye_rand, inside, sheet, window_around
+from fsid.evaluate.testbench.surface import Surface, dye_rand, inside, offsets_around, sheet
 from fsid.sensor import srgb_decode
 
 PAPER = (0.82, 0.81, 0.78)
@@ -46,8 +46,7 @@ def star_chart(rng: np.random.Generator, rows: int, columns: int) -> Surface:
         cycles = int(rng.choice((24, 36, 72, 144)))
         dark = INK if rng.random() < 0.5 else tuple(dye_rand(rng))
         radius = 0.46 * step
-        window = window_around(surface, x, y, radius + 2)
-        dx, dy = (axis[where] for axis, where in zip(_offsets(surface, x, y), _split(window), strict=True))
+        window, dx, dy = offsets_around(surface, x, y, radius + 2)
         r, phase = np.hypot(dx, dy), np.arctan2(dy, dx)
         wedge = np.clip(0.5 + np.sin(cycles * phase) * r / cycles, 0, 1)
         surface.put(window, (inside(radius - r) * wedge).astype(np.float32), dark)
@@ -124,16 +123,6 @@ def font(name: str, size_px: int) -> ImageFont.FreeTypeFont:
     """A font that comes with matplotlib."""
     with as_file(files("matplotlib").joinpath(f"mpl-data/fonts/ttf/{name}.ttf")) as file:
         return ImageFont.truetype(str(file), size_px)
-
-
-def _offsets(surface: Surface, x: float, y: float) -> tuple[np.ndarray, np.ndarray]:
-    gx, gy = surface.grid
-    return gx - x, gy - y
-
-
-def _split(window: tuple[slice, slice]) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
-    """Where a window lies on the x row and on the y column of `Surface.grid`."""
-    return (slice(None), window[1]), (window[0], slice(None))
 
 
 def _stripe(at: np.ndarray, start: float, width: float) -> np.ndarray:

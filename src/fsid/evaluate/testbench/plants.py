@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
-from fsid.evaluate.testbench.surface import Surface, dye_rand, inside, sheet, window_around
+from fsid.evaluate.testbench.surface import Surface, dye_rand, inside, offsets_around, sheet, window_around
 
 
 def plastic_flower(rng: np.random.Generator, rows: int, columns: int) -> Surface:
@@ -109,8 +109,6 @@ def _frame(
     surface: Surface, x: float, y: float, angle_deg: float, length: float
 ) -> tuple[tuple[slice, slice], np.ndarray, np.ndarray]:
     """The window that a leaf of `length` from (x, y) needs, and pixels along and across its axis in it."""
-    window = window_around(surface, x, y, length + 2)
-    gx, gy = surface.grid
-    dx, dy = gx[:, window[1]] - x, gy[window[0]] - y
+    window, dx, dy = offsets_around(surface, x, y, length + 2)
     c, s = np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))
     return window, dx * c + dy * s, dy * c - dx * s

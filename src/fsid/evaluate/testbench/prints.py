@@ -7,7 +7,7 @@ from PIL import Image, ImageDraw
 from scipy.ndimage import gaussian_filter
 
 from fsid.evaluate.testbench.charts import font, text_line
-from fsid.evaluate.testbench.surface import Surface, dye_rand, inside, sheet, window_around
+from fsid.evaluate.testbench.surface import Surface, dye_rand, inside, offsets_around, sheet
 
 SCREEN_ANGLES_DEG = (15.0, 75.0, 0.0, 45.0)
 """Of the C, M, Y and K screens of offset print."""
@@ -102,9 +102,7 @@ def _rosette(rng: np.random.Generator, surface: Surface) -> None:
     rows, columns = surface.height.shape
     x, y = rng.uniform(0.15, 0.85) * columns, rng.uniform(0.15, 0.85) * rows
     radius = rng.uniform(0.1, 0.22) * columns
-    window = window_around(surface, x, y, radius)
-    gx, gy = surface.grid
-    dx, dy = gx[:, window[1]] - x, gy[window[0]] - y
+    window, dx, dy = offsets_around(surface, x, y, radius)
     r, phase = np.hypot(dx, dy), np.arctan2(dy, dx)
     ink = tuple(rng.uniform(0.02, 0.3, 3))
     for petals in rng.integers(5, 17, 2):
@@ -116,9 +114,7 @@ def _coin(rng: np.random.Generator, surface: Surface) -> None:
     rows, columns = surface.height.shape
     x, y = rng.uniform(0.05, 0.95) * columns, rng.uniform(0.05, 0.95) * rows
     radius = rng.uniform(0.06, 0.11) * columns
-    window = window_around(surface, x, y, radius + 2)
-    gx, gy = surface.grid
-    dx, dy = gx[:, window[1]] - x, gy[window[0]] - y
+    window, dx, dy = offsets_around(surface, x, y, radius + 2)
     r, phase = np.hypot(dx, dy), np.arctan2(dy, dx)
     metal = ((0.55, 0.35, 0.22), (0.6, 0.5, 0.25), (0.5, 0.5, 0.5))[int(rng.integers(3))]
     edge, face = 0.93 * radius, 0.7 * radius

@@ -76,6 +76,15 @@ def window_around(surface: Surface, x: float, y: float, reach: float) -> tuple[s
     )
 
 
+def offsets_around(
+    surface: Surface, x: float, y: float, reach: float
+) -> tuple[tuple[slice, slice], np.ndarray, np.ndarray]:
+    """`window_around`, and how far its pixels lie right of (x, y), (1, w), and below it, (h, 1)."""
+    window = window_around(surface, x, y, reach)
+    gx, gy = surface.grid
+    return window, gx[:, window[1]] - x, gy[window[0]] - y
+
+
 def light_rand(rng: np.random.Generator, surface: Surface) -> np.ndarray:
     """(H / 2, W / 2, 3) linear light from the surface, 1 = a white sheet in the middle; never negative.
 
