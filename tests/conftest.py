@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from PIL import Image
+
+if TYPE_CHECKING:
+    from fsid.render import Renderer
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 
@@ -37,3 +42,12 @@ def shared_data() -> Path:
 def rng() -> np.random.Generator:
     """A generator with a fixed seed."""
     return np.random.default_rng(20261121)
+
+
+@pytest.fixture(scope="module")
+def renderer() -> Iterator[Renderer]:
+    """A renderer with the smallest textures, for all tests of a file."""
+    from fsid.render import Renderer
+
+    with Renderer(texture_size=64) as renderer:
+        yield renderer

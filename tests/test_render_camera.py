@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -28,12 +27,6 @@ FISHEYE = Distortion("fisheye", (0.05, -0.01, 0.002, 0.0))
 LENSES = {"barrel": BARREL, "pincushion": PINCUSHION, "fisheye": FISHEYE}
 LABEL_SAMPLE = 0.75
 """Of the 2 x 2 samples of a pixel, that of depth, normal and id lies here."""
-
-
-@pytest.fixture(scope="module")
-def renderer() -> Iterator[Renderer]:
-    with Renderer(texture_size=64) as renderer:
-        yield renderer
 
 
 def draw(renderer: Renderer, what: View) -> Frame:

@@ -8,7 +8,6 @@ degrees, where floors and table tops are seen from.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -21,12 +20,6 @@ from fsid.scene.model import Camera, Light
 from render_scenes import STILL, bake_plain, grid, plain, view
 
 BLACK = (0.0, 0.0, 0.0)
-
-
-@pytest.fixture(scope="module")
-def renderer() -> Iterator[Renderer]:
-    with Renderer(texture_size=64) as renderer:
-        yield renderer
 
 
 def fresnel(angle_deg: float) -> float:

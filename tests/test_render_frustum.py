@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -13,12 +12,6 @@ from fsid.scene import Scene, SceneConfig, sample
 from fsid.scene.model import Distortion, Light, Material
 
 CONFIG = SceneConfig(objects=(6, 9))
-
-
-@pytest.fixture(scope="module")
-def renderer() -> Iterator[Renderer]:
-    with Renderer(texture_size=64) as renderer:
-        yield renderer
 
 
 def scene(seed: int, width: int = 96) -> Scene:

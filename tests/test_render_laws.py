@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -31,12 +30,6 @@ from render_scenes import (
 NO_TURN, ONE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
 CENTRE = np.hypot(*np.mgrid[-47.5:48, -47.5:48])
 """Distance of each pixel of FROM_ABOVE from the centre of the image, in pixels."""
-
-
-@pytest.fixture(scope="module")
-def renderer() -> Iterator[Renderer]:
-    with Renderer(texture_size=64) as renderer:
-        yield renderer
 
 
 def draw(renderer: Renderer, what: View, **options: tuple[float, float]) -> Frame:

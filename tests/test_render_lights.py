@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -36,12 +35,6 @@ from render_scenes import (
 
 ONE = (1.0, 1.0, 1.0)
 SMALL = replace(FROM_ABOVE, width=32, height=32)
-
-
-@pytest.fixture(scope="module")
-def renderer() -> Iterator[Renderer]:
-    with Renderer(texture_size=64) as renderer:
-        yield renderer
 
 
 def draw(renderer: Renderer, what: View) -> Frame:

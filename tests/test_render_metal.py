@@ -7,7 +7,6 @@ closed form is Turquin's (2019), exact for white.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -20,12 +19,6 @@ from render_scenes import FROM_ABOVE, STILL, bake_plain, grid, plain, sphere, vi
 
 WALKS, MOST_BOUNCES = 40_000, 40
 WHITE, BRIGHT, DARK = (1.0, 1.0, 1.0), (0.9, 0.9, 0.9), (0.02, 0.02, 0.02)
-
-
-@pytest.fixture(scope="module")
-def renderer() -> Iterator[Renderer]:
-    with Renderer(texture_size=64) as renderer:
-        yield renderer
 
 
 def smith_lambda(cosine: np.ndarray, alpha: float) -> np.ndarray:

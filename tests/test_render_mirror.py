@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -20,12 +19,6 @@ ONE = (1.0, 1.0, 1.0)
 MIRROR_ID = 7
 ACROSS = Camera((0.0, -1.6, 0.7), (0.0, 0.2, 0.05), (0.0, 0.0, 1.0), 45.0, 160, 120)
 LIGHT = point_light((0.5, -1.2, 1.6), 3.0, 0.02)
-
-
-@pytest.fixture(scope="module")
-def renderer() -> Iterator[Renderer]:
-    with Renderer(texture_size=64) as renderer:
-        yield renderer
 
 
 def ground(roughness: int, **lobes: float) -> Drawable:

@@ -17,7 +17,7 @@ curvature of a smooth image, more of it the fewer the pixels.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -35,12 +35,6 @@ from render_scenes import FROM_ABOVE, bake_plain, block, grid, lambertian, point
 
 READ_NOISE = 2.33e-4
 LIMIT = 0.05 * READ_NOISE
-
-
-@pytest.fixture(scope="module")
-def renderer() -> Iterator[Renderer]:
-    with Renderer(texture_size=64) as renderer:
-        yield renderer
 
 
 def scene() -> View:
