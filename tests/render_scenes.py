@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from fsid.assets import MaterialMaps, Mesh, build_background
+from fsid.render import Renderer
 from fsid.render.drawable import Drawable, View
+from fsid.render.frame import Frame
 from fsid.render.texels import Texels, texels_of
 from fsid.scene.model import Camera, Light, Material, Transform, Vec3
 
@@ -91,3 +93,17 @@ def pixel_rays(camera: Camera) -> tuple[np.ndarray, np.ndarray]:
     y = (np.arange(camera.height) + 0.75) / camera.height * 2 - 1
     u, v = np.meshgrid(x * half, -y * half * camera.height / camera.width)
     return np.stack([u, v, np.ones_like(u)], axis=-1) @ rotation, rotation
+
+
+def draw(renderer: Renderer, what: View, **options: tuple[float, float]) -> Frame:
+    """The frame of a view whose materials are those of `bake_plain`."""
+    return renderer.draw(what, bake=bake_plain, **options)
+
+
+def floor_points(camera: Camera) -> np.ndarray:
+    """(H, W, 3) points of the plane z = 0 behind each pixel's centre."""
+    rays, rotation = pixel_rays(camera)
+    half_sample = 0.25 / camera.width * 2 * np.tan(np.radians(camera.fov_deg) / 2)
+    rays = rays - half_sample * (rotation[0] - rotation[1])
+    origin = np.array(camera.position_m)
+    return origin + rays * (-origin[2] / rays[..., 2:])

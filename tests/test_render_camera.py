@@ -10,7 +10,7 @@ import pytest
 from scipy.ndimage import center_of_mass, map_coordinates
 
 from fsid.errors import FsidError
-from fsid.render import Frame, Renderer
+from fsid.render import Renderer
 from fsid.render.camera import lens_of
 from fsid.render.drawable import View
 from fsid.render.exposure import Shot, shots_of
@@ -18,7 +18,7 @@ from fsid.render.flow import flow_between
 from fsid.scene import SceneConfig, sample
 from fsid.scene.distortion import distorted, fold_radius, undistorted
 from fsid.scene.model import Camera, Distortion, Motion, Transform
-from render_scenes import FROM_ABOVE, bake_plain, block, grid, lambertian, plain, point_light, sphere, view
+from render_scenes import FROM_ABOVE, block, draw, grid, lambertian, plain, point_light, sphere, view
 
 ONE = (1.0, 1.0, 1.0)
 BARREL = Distortion("brown-conrady", (-0.25, 0.06, 0.002, -0.001, 0.0))
@@ -27,10 +27,6 @@ FISHEYE = Distortion("fisheye", (0.05, -0.01, 0.002, 0.0))
 LENSES = {"barrel": BARREL, "pincushion": PINCUSHION, "fisheye": FISHEYE}
 LABEL_SAMPLE = 0.75
 """Of the 2 x 2 samples of a pixel, that of depth, normal and id lies here."""
-
-
-def draw(renderer: Renderer, what: View) -> Frame:
-    return renderer.draw(what, bake=bake_plain)
 
 
 def at(x: float, y: float, z: float = 0.0) -> Transform:

@@ -9,15 +9,16 @@ import pytest
 from scipy.ndimage import binary_erosion
 
 from fsid.assets import Mesh
-from fsid.render import Frame, Renderer
-from fsid.render.drawable import BACKGROUND_ID, Drawable, View, background_drawable
+from fsid.render import Renderer
+from fsid.render.drawable import BACKGROUND_ID, Drawable, background_drawable
 from fsid.render.shadows import Source, Tile, plan_shadows
 from fsid.scene.model import Background, Camera, Light, Sky, Transform
 from render_scenes import (
     FROM_ABOVE,
     STILL,
-    bake_plain,
     block,
+    draw,
+    floor_points,
     grid,
     lambertian,
     pixel_rays,
@@ -30,19 +31,6 @@ from render_scenes import (
 NO_TURN, ONE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
 CENTRE = np.hypot(*np.mgrid[-47.5:48, -47.5:48])
 """Distance of each pixel of FROM_ABOVE from the centre of the image, in pixels."""
-
-
-def draw(renderer: Renderer, what: View, **options: tuple[float, float]) -> Frame:
-    return renderer.draw(what, bake=bake_plain, **options)
-
-
-def floor_points(camera: Camera, sample: float = 0.5) -> np.ndarray:
-    """(H, W, 3) points of the plane z = 0 behind each pixel's centre (sample = 0.75: of the id's sample)."""
-    moved = (sample - 0.75) / camera.width * 2 * np.tan(np.radians(camera.fov_deg) / 2)
-    rays, rotation = pixel_rays(camera)
-    rays = rays + moved * (rotation[0] - rotation[1])
-    origin = np.array(camera.position_m)
-    return origin + rays * (-origin[2] / rays[..., 2:])
 
 
 @pytest.mark.parametrize("height_m", [0.5, 1.0, 1.9])

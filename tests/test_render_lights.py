@@ -12,8 +12,8 @@ import fsid.assets.skies
 import fsid.render.sky
 from fsid.assets import Mesh, survey_skies
 from fsid.errors import FsidError
-from fsid.render import Frame, Renderer
-from fsid.render.drawable import Drawable, View, background_drawable, panel_drawable, view_of
+from fsid.render import Renderer
+from fsid.render.drawable import Drawable, background_drawable, panel_drawable, view_of
 from fsid.render.lamps import hoods_apart
 from fsid.render.room import light_sky
 from fsid.render.sky import angles, panorama
@@ -22,11 +22,11 @@ from fsid.scene.model import Background, Camera, Light, Sky, Transform, Vec3
 from render_scenes import (
     FROM_ABOVE,
     STILL,
-    bake_plain,
     block,
+    draw,
+    floor_points,
     grid,
     lambertian,
-    pixel_rays,
     plain,
     point_light,
     sphere,
@@ -35,19 +35,6 @@ from render_scenes import (
 
 ONE = (1.0, 1.0, 1.0)
 SMALL = replace(FROM_ABOVE, width=32, height=32)
-
-
-def draw(renderer: Renderer, what: View) -> Frame:
-    return renderer.draw(what, bake=bake_plain)
-
-
-def floor_points(camera: Camera) -> np.ndarray:
-    """(H, W, 3) points of z = 0 behind each pixel's centre."""
-    rays, rotation = pixel_rays(camera)
-    half_sample = 0.25 / camera.width * 2 * np.tan(np.radians(camera.fov_deg) / 2)
-    rays = rays - half_sample * (rotation[0] - rotation[1])
-    origin = np.array(camera.position_m)
-    return origin + rays * (-origin[2] / rays[..., 2:])
 
 
 def sun(direction: Vec3, irradiance: float = 2.0, tangent: float = 0.0047) -> Light:
