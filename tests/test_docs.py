@@ -38,9 +38,20 @@ GUIDES = (
 )
 
 
+def blocks(page: str, language: str) -> list[str]:
+    """The blocks of a page that are in a language, in its order."""
+    text = (REPOSITORY / page).read_text(encoding="utf-8")
+    return re.findall(rf"```{language}\n(.*?)```", text, re.S)
+
+
 def commands(guide: str) -> list[str]:
-    text = (REPOSITORY / "docs" / guide).read_text(encoding="utf-8")
-    return [line for block in re.findall(r"```sh\n(.*?)```", text, re.S) for line in block.splitlines()]
+    return [line for block in blocks(f"docs/{guide}", "sh") for line in block.splitlines()]
+
+
+def run_python(page: str, python: str = "", **names: Any) -> dict[str, Any]:
+    """What is named after the Python of a page, or after `python`, which is some of it."""
+    exec(compile(python or "\n".join(blocks(page, "python")), page, "exec"), names)
+    return names
 
 
 @pytest.fixture(scope="module")
@@ -136,9 +147,7 @@ def test_what_the_guides_promise_is_there(desk: Path):
 
 def test_the_python_of_the_calibration_guide_runs(desk: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(desk)
-    text = (REPOSITORY / "docs" / "calibrate.md").read_text(encoding="utf-8")
-    (block,) = re.findall(r"```python\n(.*?)```", text, re.S)
-    exec(compile(block, "calibrate.md", "exec"), {})
+    run_python("docs/calibrate.md")
     profile, true = load_profile(desk / "arrays.yaml"), load_profile("galaxy-s22")
     assert profile.iso == (800, 3200)
     np.testing.assert_allclose(profile.k[1], true.level(3200).k, rtol=0.1)
@@ -152,9 +161,7 @@ def test_the_python_of_the_guide_to_measuring_runs(desk: Path, monkeypatch: pyte
         target = "theirs" / testset.noisy(Path(), image, level)
         target.parent.mkdir(parents=True, exist_ok=True)
         write_dng(target, read_raw(testset.clean(Path("testset"), image, level)))
-    text = (REPOSITORY / "docs" / "evaluate.md").read_text(encoding="utf-8")
-    (block,) = re.findall(r"```python\n(.*?)```", text, re.S)
-    exec(compile(block, "evaluate.md", "exec"), {})
+    run_python("docs/evaluate.md")
     rows = json.loads((desk / "compared.json").read_text())
     assert {row["model"] for row in rows} == {"noisy", "classical", "mine", "theirs"}
     assert all(row["psnr_raw"] is None or row["psnr_raw"] > 90 for row in rows if row["model"] == "theirs")
@@ -165,10 +172,9 @@ def test_the_python_of_the_guide_to_stereo_makes_a_pair_whose_labels_lead_from_o
 ):
     """Runs after the guides: one of them writes the scene."""
     monkeypatch.chdir(desk)
-    text = (REPOSITORY / "docs" / "stereo-and-labels.md").read_text(encoding="utf-8")
-    block, of_pairs = re.findall(r"```python\n(.*?)```", text, re.S)
-    names: dict[str, Any] = {}
-    exec(compile(block, "stereo-and-labels.md", "exec"), names)
+    page = "docs/stereo-and-labels.md"
+    of_frames, of_pairs = blocks(page, "python")
+    names = run_python(page, of_frames)
     with np.load("pair.npz") as pair:
         left, right, disparity, visible = (pair[k] for k in ("left", "right", "disparity", "visible"))
     assert 0.6 < visible.mean() < 1
@@ -176,7 +182,7 @@ def test_the_python_of_the_guide_to_stereo_makes_a_pair_whose_labels_lead_from_o
     there = np.rint(columns - disparity).astype(int).clip(0, visible.shape[1] - 1)
     apart = np.abs(right[rows, there] - left)[visible].mean()
     assert apart < 0.25 * np.abs(right - left)[visible].mean()
-    exec(compile(of_pairs.replace('"data"', '"many"'), "stereo-and-labels.md", "exec"), names)  # has crops
+    names = run_python(page, of_pairs.replace('"data"', '"many"'), **names)  # has crops
     clean = read_raw(io.BytesIO(read_member(names["shard"], f"{names['key']}.clean.dng")))
     with np.load(f"{names['key']}.labels.npz") as labels:
         assert labels["depth"].shape == labels["object_id"].shape == clean.mosaic.shape
@@ -191,9 +197,7 @@ def test_the_python_for_bare_mosaics_makes_captures(tmp_path: Path, monkeypatch:
         target = ("mosaics" / path.relative_to("taken")).with_suffix(".npy")
         target.parent.mkdir(parents=True, exist_ok=True)
         np.save(target, to_dn(read_raw(path)))
-    text = (REPOSITORY / "docs" / "capture-a-test-set.md").read_text(encoding="utf-8")
-    (block,) = re.findall(r"```python\n(.*?)```", text, re.S)
-    exec(compile(block, "capture-a-test-set.md", "exec"), {})
+    run_python("docs/capture-a-test-set.md")
     main(["testset", "from-bursts", "captures", "-o", "set", "--camera", "pixel6", "--quiet"])
     first = read_raw("set/star/0.5lux.noisy.dng")
     np.testing.assert_array_equal(to_dn(first), np.load("mosaics/star/0.5lux/0000.npy"))
@@ -207,9 +211,7 @@ def test_the_python_of_the_guide_to_clusters_makes_one_dataset_of_two(
     for seed in ("0", "1"):
         small = ["--count", "3", "--width", "64", "--height", "64", "--quiet"]
         main(["generate", f"node{seed}", "--seed", seed, "--images", str(photos), *small])
-    text = (REPOSITORY / "docs" / "cluster.md").read_text(encoding="utf-8")
-    (block,) = re.findall(r"```python\n(.*?)```", text, re.S)
-    exec(compile(block, "cluster.md", "exec"), {})
+    run_python("docs/cluster.md")
     found = index_mosaics("all")
     assert [m.key for m in found] == [f"{seed}-{i:08d}" for seed in range(2) for i in range(3)]
     assert [m.scene for m in found] == 2 * [0, 1, 2]  # the pictures that both are of
@@ -220,10 +222,7 @@ def test_the_guide_to_python_runs_and_makes_what_the_commands_make(
 ):
     monkeypatch.chdir(tmp_path)
     shutil.copytree(photos, tmp_path / "photographs")
-    text = (REPOSITORY / "docs" / "python.md").read_text(encoding="utf-8")
-    blocks = re.findall(r"```python\n(.*?)```", text, re.S)
-    found: dict[str, Any] = {"__name__": "__main__"}
-    exec(compile("\n".join(blocks), "python.md", "exec"), found)
+    found = run_python("docs/python.md", __name__="__main__")
     frame, scene = found["frame"], found["scene"]
     assert (frame.object_id == len(scene.objects) - 1).any()  # the mug that was put into the picture
     pairs = found["Pairs"](found["config"], seed=0, count=2)
@@ -242,10 +241,7 @@ def test_the_readme_names_every_command_and_no_other():
 def test_the_python_of_the_readme_runs(desk: Path, monkeypatch: pytest.MonkeyPatch):
     """With the network that ships; runs after the guides, which leave noisy.dng behind."""
     monkeypatch.chdir(desk)
-    (block,) = re.findall(
-        r"```python\n(.*?)```", (REPOSITORY / "README.md").read_text(encoding="utf-8"), re.S
-    )
-    exec(compile(block, "README.md", "exec"), {})
+    run_python("README.md")
     clean, noisy = read_raw(desk / "clean.dng"), read_raw(desk / "noisy.dng")
     assert clean.mosaic.shape == noisy.mosaic.shape
     assert np.abs(np.diff(clean.mosaic[::2, ::2])).mean() < np.abs(np.diff(noisy.mosaic[::2, ::2])).mean()
