@@ -51,7 +51,8 @@ def contact_sheet(
     """The clean images of samples 0 .. count-1, developed, in a grid: (H, W, 3) uint8 sRGB.
 
     Each is made twice as wide and high and then reduced, as photographs are looked at: pixel by pixel, fine
-    texture behind a mosaic is full of false colour, which looks like noise.
+    texture behind a mosaic is full of false colour, which looks like noise. FsidError for a count below 1,
+    and as `make_sample`.
     """
     if count < 1:
         raise FsidError(f"--count {count}: at least one scene is needed")

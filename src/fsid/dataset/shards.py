@@ -105,7 +105,7 @@ def count_whole(path: str | Path) -> int:
 
 
 def read_member(path: str | Path, name: str) -> bytes:
-    """One file of a shard, for example `00000000.json`."""
+    """One file of a shard, for example `00000000.json`. FsidError where it or the shard cannot be read."""
     with open_shard(Path(path)) as (tar, members):
         found = [member for member in members if member.name == name]
         if not found:

@@ -40,7 +40,8 @@ Progress = Callable[[int, int], None]
 
 
 class Network(Protocol):
-    """What runs the tiles: PyTorch (`Denoiser`) or onnxruntime (`OnnxDenoiser`); both mean the same."""
+    """What runs the tiles: PyTorch (`Denoiser`, which says what each of these is) or onnxruntime
+    (`OnnxDenoiser`)."""
 
     @property
     def card(self) -> ModelCard: ...

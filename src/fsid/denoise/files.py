@@ -112,7 +112,11 @@ def _check_iso(profile: str | None, iso: float | None) -> None:
 
 
 def noise_of(raw: Raw, profile: str | None, iso: float | None, path: Path) -> Noise:
-    """The level of a profile at an ISO (by default the file's), else the file's own, else the image's."""
+    """The level of a profile at an ISO (by default the file's), else the file's own, else the image's.
+
+    path: names the file in errors. FsidError: an ISO without a profile or an unknown one, a profile that is
+    none, noise below 0, an image that does not tell its noise.
+    """
     _check_iso(profile, iso)
     if profile is not None:
         iso = iso if iso is not None else raw.iso

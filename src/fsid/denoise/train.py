@@ -246,7 +246,10 @@ def _card(data_dir: Path, config: TrainConfig, images: int, initial: Denoiser | 
 
 
 def load_history(run_dir: str | Path) -> tuple[list[int], list[float], list[float]]:
-    """Steps, losses and PSNRs (dB) of a run's training batches, means over `log_every` steps each."""
+    """Steps, losses and PSNRs (dB) of a run's training batches, means over `log_every` steps each.
+
+    FsidError where the folder holds no history of a training.
+    """
     path = Path(run_dir) / HISTORY_FILE
     if not path.is_file():
         raise FsidError(f"{path}: cannot be read; give the folder of a training")

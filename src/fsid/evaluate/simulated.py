@@ -43,6 +43,7 @@ def simulated_testset(
     """Draw `scenes` pictures of every material and capture `frames` noisy frames of each at every level.
 
     luxes and isos: the levels, LUXES where neither is given. materials: of MATERIALS, all where none is.
+    FsidError for a camera, levels, materials or sizes that cannot be used, or an `out` that is not empty.
     """
     profile = load_bayer_profile(camera)
     isos, luxes = tuple(isos), tuple(luxes)

@@ -141,6 +141,7 @@ def photo_testset(
     where a phone brightens digitally.
 
     The set of an image is the name of its folder. Photograph i draws from SeedSequence(seed, spawn_key=(i,)).
+    FsidError for a camera, levels, folders or photographs that cannot be used, or an `out` that is not empty.
     """
     profile = load_bayer_profile(camera)
     levels = levels_of(profile, isos, luxes)

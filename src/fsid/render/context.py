@@ -67,7 +67,10 @@ def open_context(device_index: int | None) -> moderngl.Context:
 
 
 def egl_devices() -> dict[int, GlInfo]:
-    """EGL device index -> what it is, of all that give OpenGL 4.3. Not while a Renderer is open."""
+    """EGL device index -> what it is, of all that give OpenGL 4.3. Not while a Renderer is open.
+
+    FsidError in a process forked from one that has used OpenGL.
+    """
     check_not_forked()
     found: dict[int, GlInfo] = {}
     for index in range(_MAX_DEVICES):

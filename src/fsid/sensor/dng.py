@@ -69,7 +69,10 @@ def write_dng(target: str | Path | BinaryIO, raw: Raw, preview: np.ndarray | Non
 
 
 def dng_pixel_offset(dng: str | Path | BinaryIO) -> int:
-    """Byte offset of the mosaic, (H, W) little-endian uint16, in a DNG written by `write_dng`."""
+    """Byte offset of the mosaic, (H, W) little-endian uint16, in a DNG written by `write_dng`.
+
+    FsidError for a file that is no such DNG.
+    """
     if isinstance(dng, str | Path):
         with Path(dng).open("rb") as file:
             return dng_pixel_offset(file)

@@ -44,7 +44,10 @@ def shift_cfa(cfa: str, rows: int, columns: int) -> str:
 
 
 def mosaic(rgb: Any, cfa: str) -> Any:
-    """Keep of each pixel of `rgb` (H, W, 3), H and W even, the one channel its filter passes: (H, W)."""
+    """Keep of each pixel of `rgb` (H, W, 3), H and W even, the one channel its filter passes: (H, W).
+
+    FsidError for another shape or pattern.
+    """
     check_even(rgb.shape[:2])
     if rgb.shape[2:] != (3,):
         raise FsidError(f"a picture must have shape (height, width, 3), RGB; got {tuple(rgb.shape)}")
@@ -55,13 +58,16 @@ def mosaic(rgb: Any, cfa: str) -> Any:
 
 
 def pack(mosaic: Any, cfa: str) -> Any:
-    """Mosaic (H, W), H and W even, to its four sites (4, H/2, W/2) in the order R, Gr, Gb, B."""
+    """Mosaic (H, W), H and W even, to its four sites (4, H/2, W/2) in the order R, Gr, Gb, B.
+
+    FsidError for another shape or pattern.
+    """
     check_even(mosaic.shape)
     return namespace(mosaic).stack([mosaic[r::2, c::2] for r, c in site_offsets(cfa)])
 
 
 def unpack(packed: Any, cfa: str) -> Any:
-    """Inverse of `pack`: (4, H/2, W/2) to (H, W)."""
+    """Inverse of `pack`: (4, H/2, W/2) to (H, W). FsidError for another shape or pattern."""
     if packed.ndim != 3 or packed.shape[0] != 4:
         raise FsidError(f"packed RAW has shape {packed.shape}; expected (4, height/2, width/2)")
     out = namespace(packed).empty_like(packed.reshape(2 * packed.shape[1], 2 * packed.shape[2]))
@@ -90,7 +96,8 @@ def bayer_crop(raw: Raw, top: int, left: int, height: int, width: int) -> Raw:
     """Crop to any pixel offset; the pattern of the result is the one its own first pixel sees.
 
     Even offsets keep the pattern; an odd one shifts it, which is also how one unifies patterns:
-    `bayer_crop(raw, 0, 1, h, w - 2)` of RGGB is GRBG. height and width even, inside the image.
+    `bayer_crop(raw, 0, 1, h, w - 2)` of RGGB is GRBG. FsidError unless height and width are even and the crop
+    lies inside the image.
     """
     rows, columns = raw.mosaic.shape
     check_even((height, width))

@@ -80,7 +80,7 @@ def level_rand(
 
     The jitter is one log-normal factor on k (relative sigma `K_JITTER`) and one on sigma2
     (`SIGMA2_JITTER`), common to all sites: another unit of the same camera at another temperature. sigma2
-    stays at or above the rounding noise, which no unit is without.
+    stays at or above the rounding noise, which no unit is without. FsidError unless 0 < low <= high.
     """
     low, high = iso_range
     if not 0 < low <= high:

@@ -69,7 +69,7 @@ def clean_from_linear(
 def clean_from_photo(rng: np.random.Generator, srgb: np.ndarray, profile: CameraProfile) -> Raw:
     """Unprocess a photo (H, W, 3), sRGB-encoded 0..1, with random colour and exposure: float Raw in 0..1.
 
-    An odd last row or column is dropped.
+    An odd last row or column is dropped. FsidError for what is no such photo.
     """
     check_srgb(srgb)
     matrix, gains = colour_rand(rng, profile.xyz_to_camera)

@@ -34,6 +34,7 @@ def unprocess(
     """Photo (H, W, 3), sRGB-encoded 0..1, to linear camera RGB (H, W, 3) float32 0..1 before white balance.
 
     exposure multiplies the light (1 / rgb gain of Brooks et al.); white stays at saturation whatever it is.
+    FsidError for what is no such photo.
     """
     check_srgb(srgb)
     linear = photo_to_linear(srgb)
