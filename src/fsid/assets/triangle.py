@@ -48,11 +48,13 @@ def encode(rgb: np.ndarray, colours: Triple) -> tuple[np.ndarray, np.ndarray, np
     return mix, pattern, np.minimum(total / 2, 1.0)
 
 
-def decode(mix: np.ndarray, pattern: np.ndarray, detail: np.ndarray, colours: Triple) -> np.ndarray:
-    """The equation of `fsid.assets.maps`: linear albedo (..., 3)."""
-    a, b, c = np.array(colours, np.float32)
-    m, p, d = mix[..., None], pattern[..., None], detail[..., None]
-    return ((a * (1 - m) + b * m) * (1 - p) + c * p) * (2 * d)
+def decode(
+    mix: np.ndarray, pattern: np.ndarray, detail: np.ndarray, colours: Triple | np.ndarray
+) -> np.ndarray:
+    """The equation of `fsid.assets.maps`: linear albedo (..., 3), as precise as the colours."""
+    a, b, c = np.asarray(colours)
+    ground = a + mix[..., None] * (b - a)
+    return np.asarray((ground + pattern[..., None] * (c - ground)) * (2 * detail[..., None]))
 
 
 def enclosing(rgb: np.ndarray) -> Triple:

@@ -18,6 +18,7 @@ import numpy as np
 from PIL import Image
 
 from fsid.assets import MaterialMaps
+from fsid.assets.triangle import decode
 from fsid.render.parts import Surface
 from fsid.scene.model import Material
 
@@ -71,9 +72,8 @@ _V = np.array([(0, 0, -1)] * 4 + [(0, -1, 0), (0, 1, 0)], dtype=float)
 
 def base_colour(maps: MaterialMaps, material: Material) -> np.ndarray:
     """(S, S, 3) uint8, sRGB."""
-    a, b, c = (np.array(colour, np.float32) for colour in material.colours)
-    ground = a + maps.mix[..., None] * (b - a)
-    linear = np.clip((ground + maps.pattern[..., None] * (c - ground)) * (2 * maps.detail[..., None]), 0, 1)
+    colours = np.array(material.colours, np.float32)
+    linear = np.clip(decode(maps.mix, maps.pattern, maps.detail, colours), 0, 1)
     return _bytes(np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055))
 
 

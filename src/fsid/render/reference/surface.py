@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fsid.assets import MaterialMaps
+from fsid.assets.triangle import decode
 from fsid.scene.model import Material
 
 BLEND = 0.2
@@ -95,9 +96,7 @@ def shade(points: Points, material: Material, pyramid: Pyramid) -> Shading:
         slope = found[:, 5:7] * material.relief_scale
         gradient[at] += share * (slope[:, :1] * u + slope[:, 1:] * v)
     mix, pattern, detail, roughness, metallic = values.T[:5]
-    a, b, c = (np.array(colour) for colour in material.colours)
-    ground = a + mix[:, None] * (b - a)
-    albedo = (ground + pattern[:, None] * (c - ground)) * (2 * detail)[:, None]
+    albedo = decode(mix, pattern, detail, material.colours)
     n = points.normal
     bumped = n - (gradient - n * (n * gradient).sum(1, keepdims=True))
     spread2 = np.maximum(values[:, 7] - (values[:, 5:7] ** 2).mean(1), 0) * material.relief_scale**2
