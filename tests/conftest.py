@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -51,3 +51,21 @@ def renderer() -> Iterator[Renderer]:
 
     with Renderer(texture_size=64) as renderer:
         yield renderer
+
+
+@pytest.fixture
+def refused(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
+    """Runs a command that must end with a line of its own and exit code 2; what it told on stderr."""
+    from fsid.cli.main import main
+
+    def run(*arguments: str | Path) -> str:
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as stop:
+            main([str(argument) for argument in arguments])
+        assert stop.value.code == 2
+        told = capsys.readouterr().err.rstrip("\n")
+        assert told.rpartition("\n")[2].startswith("fsid: ")
+        assert "Traceback" not in told
+        return told
+
+    return run

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -12,18 +13,6 @@ from PIL import Image
 
 from fsid.cli.main import COMMANDS, main
 from fsid.errors import FsidError
-
-
-def refused(capsys: pytest.CaptureFixture[str], *arguments: str | Path) -> str:
-    """The line that a refused command prints."""
-    with pytest.raises(SystemExit) as stop:
-        main([str(argument) for argument in arguments])
-    assert stop.value.code == 2
-    line = capsys.readouterr().err.strip()
-    assert line.startswith("fsid: ")
-    assert "\n" not in line
-    assert "Traceback" not in line
-    return line
 
 
 @pytest.fixture
@@ -162,11 +151,12 @@ def test_bad_input_is_one_line(
     command: str,
     named: str,
     folder: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
+    refused: Callable[..., str],
 ):
     before = sorted(folder.rglob("*"))
-    assert named in refused(capsys, *command.format(folder).split())
+    line = refused(*command.format(folder).split())
+    assert named in line
+    assert "\n" not in line
     assert sorted(folder.rglob("*")) == before
 
 

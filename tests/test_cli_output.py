@@ -10,6 +10,7 @@ import re
 import shlex
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -227,14 +228,10 @@ def test_the_version_is_told(capsys: pytest.CaptureFixture[str]) -> None:
     ],
 )
 def test_a_configuration_that_is_none_is_refused_with_those_that_are(
-    command: str, names: str, tmp_path: Path, monkeypatch, capsys: pytest.CaptureFixture[str]
+    command: str, names: str, tmp_path: Path, monkeypatch, refused: Callable[..., str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(SystemExit) as stop:
-        cli.main(command.split())
-    assert stop.value.code == 2
-    told = " ".join(capsys.readouterr().err.split())
-    assert f"is no file and no built-in configuration ({names})" in told
+    assert f"is no file and no built-in configuration ({names})" in refused(*command.split())
     assert not any(tmp_path.iterdir())
 
 

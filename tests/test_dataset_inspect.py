@@ -172,7 +172,7 @@ def test_photographs_and_the_dataset_made_from_them_are_seen_alike(photos, tmp_p
     assert (tmp_path / "out" / "statistics.png").stat().st_size > 10_000
 
 
-def test_a_folder_that_refuses_files_is_said_before_the_work(photos, tmp_path, capsys, monkeypatch):
+def test_a_folder_that_refuses_files_is_said_before_the_work(photos, tmp_path, refused, monkeypatch):
     """Else minutes of measuring would be lost; and neither file is written without the other."""
 
     def never(*_, **__):
@@ -181,18 +181,12 @@ def test_a_folder_that_refuses_files_is_said_before_the_work(photos, tmp_path, c
     command = ["inspect", str(photos), "--quiet", "--out"]
     (tmp_path / "file").write_text("")
     (tmp_path / "out" / "statistics.png").mkdir(parents=True)
-    with pytest.raises(SystemExit):
-        main([*command, str(tmp_path / "out")])
-    assert "statistics.png: cannot be written" in capsys.readouterr().err
+    assert "statistics.png: cannot be written" in refused(*command, tmp_path / "out")
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["statistics.png"]
     monkeypatch.setattr("fsid.dataset.inspect.inspect", never)
-    with pytest.raises(SystemExit):
-        main([*command, str(tmp_path / "file" / "out")])
-    assert "file is no folder that you may write to" in " ".join(capsys.readouterr().err.split())
+    assert "file is no folder that you may write to" in refused(*command, tmp_path / "file" / "out")
     monkeypatch.setattr("fsid.files.os.access", lambda *_: False)
-    with pytest.raises(SystemExit):
-        main([*command, str(tmp_path / "new")])
-    assert "that you may write to" in " ".join(capsys.readouterr().err.split())
+    assert "that you may write to" in refused(*command, tmp_path / "new")
     assert not (tmp_path / "new").exists()
 
 
@@ -294,11 +288,8 @@ def test_a_sample_without_its_colours_is_named(record, tmp_path):
         (["PHOTOS", "--reference", "PHOTOS", "--limit", "1"], "one picture has no spread"),
     ],
 )
-def test_bad_input_is_one_line(photos, arguments, words, capsys):
-    with pytest.raises(SystemExit) as stop:
-        main(["inspect", *(a.replace("PHOTOS", str(photos)) for a in arguments), "--quiet"])
-    assert stop.value.code == 2
-    assert words in " ".join(capsys.readouterr().err.split())
+def test_bad_input_is_one_line(photos, arguments, words, refused):
+    assert words in refused("inspect", *(a.replace("PHOTOS", str(photos)) for a in arguments), "--quiet")
 
 
 def test_colours_are_counted_on_both_axes_of_their_plane():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -151,9 +152,7 @@ def test_the_strongest_smoothing_keeps_the_colours(strength: float) -> None:
     np.testing.assert_allclose(means, true, rtol=0.03)
 
 
-def test_a_folder_is_done_file_by_file(
-    tmp_path: Path, network: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_folder_is_done_file_by_file(tmp_path: Path, network: Path, refused: Callable[..., str]) -> None:
     folder, out = tmp_path / "in", tmp_path / "out"
     folder.mkdir()
     for name in ("a", "b"):
@@ -164,18 +163,13 @@ def test_a_folder_is_done_file_by_file(
     assert read_raw(out / "a.dng").mosaic.shape == (256, 320)
     (folder / "aa.dng").write_text("broken")
     (folder / "._a.dng").write_text("what a Mac leaves beside a.dng")
-    with pytest.raises(SystemExit) as stop:
-        main(["denoise", str(folder), str(tmp_path / "again"), "--model", str(network), "--quiet"])
-    assert stop.value.code == 2
-    told = capsys.readouterr().err
+    told = refused("denoise", folder, tmp_path / "again", "--model", network, "--quiet")
     assert "aa.dng" in told
     assert "1 of 3 files" in told
     assert sorted(path.name for path in (tmp_path / "again").iterdir()) == ["a.dng", "b.dng"]
     (folder / "0.nef").write_text("broken, and first: nothing may be written before the folder is refused")
     before = {path: path.read_bytes() for path in folder.iterdir()}
-    with pytest.raises(SystemExit):
-        main(["denoise", str(folder), str(folder), "--model", str(network), "--quiet"])
-    told = capsys.readouterr().err
+    told = refused("denoise", folder, folder, "--model", network, "--quiet")
     assert "overwritten" in told
     assert "0.nef" not in told
     assert {path: path.read_bytes() for path in folder.iterdir()} == before
@@ -218,7 +212,7 @@ def test_a_noise_profile_of_zeros_is_none(
 
 
 def test_a_layout_that_a_profile_contradicts_is_said(
-    tmp_path: Path, network: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, network: Path, capsys: pytest.CaptureFixture[str], refused: Callable[..., str]
 ) -> None:
     measured = Measurement(
         k_error=np.full((1, 4), 1e-5),
@@ -244,48 +238,43 @@ def test_a_layout_that_a_profile_contradicts_is_said(
         main([*command, "--cfa", cfa, "--white-level", white, "--black-level", "60,66,64,70"])
         assert f"note: {what}: profile {tmp_path / 'mine.yaml'} was measured on" in capsys.readouterr().err
     for levels in ("60,66", "60;66", ""):
-        with pytest.raises(SystemExit):
-            main([*command, *own, "--black-level", levels])
-        assert "--black-level" in capsys.readouterr().err
+        assert "--black-level" in refused(*command, *own, "--black-level", levels)
 
 
 def test_an_unreadable_file_is_left_out_of_a_folder(
-    tmp_path: Path, network: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, network: Path, monkeypatch: pytest.MonkeyPatch, refused: Callable[..., str]
 ) -> None:
     folder, read = tmp_path / "in", fsid.sensor.dng._read_source
     folder.mkdir()
     for name in ("a", "b"):
         write_dng(folder / f"{name}.dng", noisy_raw())
 
-    def refused(file: BinaryIO, path: Path) -> object:
+    def locked(file: BinaryIO, path: Path) -> object:
         if path.name == "a.dng":
             raise PermissionError(13, "Permission denied", str(path))
         return read(file, path)
 
-    monkeypatch.setattr("fsid.sensor.dng._read_source", refused)
-    with pytest.raises(SystemExit) as stop:
-        main(["denoise", str(folder), str(tmp_path / "out"), "--model", str(network), "--quiet"])
-    assert stop.value.code == 2
-    assert "a.dng: cannot be read (Permission denied)" in capsys.readouterr().err
+    monkeypatch.setattr("fsid.sensor.dng._read_source", locked)
+    assert "a.dng: cannot be read (Permission denied)" in refused(
+        "denoise", folder, tmp_path / "out", "--model", network, "--quiet"
+    )
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["b.dng"]
 
 
 def test_what_is_said_of_files_does_not_depend_on_a_broken_one(
-    tmp_path: Path, network: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, network: Path, refused: Callable[..., str]
 ) -> None:
     (folder := tmp_path / "in").mkdir()
     write_dng(folder / "a.dng", replace(noisy_raw(), noise=None))
     write_dng(folder / "b.dng", replace(noisy_raw(), noise=NoiseLevel((0.03,) * 4, (0.001,) * 4)))
     (folder / "c.dng").write_bytes((folder / "a.dng").read_bytes()[:5000])
-    with pytest.raises(SystemExit):
-        main(["denoise", str(folder), str(tmp_path / "out"), "--model", str(network)])
-    said = capsys.readouterr().err
+    said = refused("denoise", folder, tmp_path / "out", "--model", network)
     assert f"the noise of 1 of 2 files, the first one {folder / 'a.dng'}, is estimated" in said
     assert f"{folder / 'b.dng'}: more noise than networks keep" in said
 
 
 def test_a_folder_may_be_finished_without_doing_it_again(
-    tmp_path: Path, network: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, network: Path, capsys: pytest.CaptureFixture[str], refused: Callable[..., str]
 ) -> None:
     (folder := tmp_path / "in").mkdir()
     for name in ("a", "b"):
@@ -301,11 +290,9 @@ def test_a_folder_may_be_finished_without_doing_it_again(
     assert (out / "a.dng").read_bytes() != b"made before"
     assert (out / "b.dng").read_bytes() == whole
     main([*command, "--skip-existing", "--quiet"])
-    with pytest.raises(SystemExit):
-        main(
-            ["denoise", str(folder / "a.dng"), str(out / "c.dng"), "--model", str(network), "--skip-existing"]
-        )
-    assert "--skip-existing: is for a folder" in capsys.readouterr().err
+    assert "--skip-existing: is for a folder" in refused(
+        "denoise", folder / "a.dng", out / "c.dng", "--model", network, "--skip-existing"
+    )
 
 
 def test_a_picture_keeps_its_own_iso(noisy_file: Path, network: Path) -> None:
@@ -315,15 +302,11 @@ def test_a_picture_keeps_its_own_iso(noisy_file: Path, network: Path) -> None:
     assert read_raw(out).iso == own
 
 
-def test_an_original_is_not_overwritten(
-    noisy_file: Path, network: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_original_is_not_overwritten(noisy_file: Path, network: Path, refused: Callable[..., str]) -> None:
     before = noisy_file.read_bytes()
     (noisy_file.parent / "sub").mkdir()
     for same in (noisy_file, noisy_file.parent / "sub" / ".." / noisy_file.name):
-        with pytest.raises(SystemExit):
-            main(["denoise", str(noisy_file), str(same), "--model", str(network), "--quiet"])
-        assert "original" in capsys.readouterr().err
+        assert "original" in refused("denoise", noisy_file, same, "--model", network, "--quiet")
     assert noisy_file.read_bytes() == before
 
 
@@ -355,7 +338,7 @@ def test_a_place_that_takes_no_file_is_said_before_the_work(
 
 
 def test_a_folder_of_bare_mosaics(
-    tmp_path: Path, network: Path, rng: np.random.Generator, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, network: Path, rng: np.random.Generator, refused: Callable[..., str]
 ) -> None:
     folder = tmp_path / "in"
     folder.mkdir()
@@ -363,34 +346,29 @@ def test_a_folder_of_bare_mosaics(
         np.save(folder / f"{name}.npy", rng.integers(64, 1023, (48, 64), dtype=np.uint16))
     command = ["denoise", str(folder), str(tmp_path / "out"), "--model", str(network), "--quiet"]
     command += ["--profile", "pixel6", "--iso", "3200"]
-    with pytest.raises(SystemExit):
-        main(command)
-    assert "holds no RAW file" in capsys.readouterr().err
+    assert "holds no RAW file" in refused(*command)
     main([*command, "--cfa", "GBRG", "--black-level", "64", "--white-level", "1023"])
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["a.dng", "b.dng"]
     assert read_raw(tmp_path / "out" / "a.dng").cfa == "GBRG"
 
 
 def test_options_of_bare_mosaics_are_for_these_alone(
-    tmp_path: Path, noisy_file: Path, network: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, noisy_file: Path, network: Path, refused: Callable[..., str]
 ) -> None:
-    def refused(source: Path, *options: str) -> str:
-        with pytest.raises(SystemExit):
-            main(["denoise", str(source), str(tmp_path / "out.dng"), "--model", str(network), *options])
-        (line,) = capsys.readouterr().err.splitlines()
-        return line
+    def line_of(source: Path, *options: str) -> str:
+        return refused("denoise", source, tmp_path / "out.dng", "--model", network, *options)
 
     levels = ("--cfa", "RGGB", "--black-level", "64", "--white-level", "1023")
     for options in (("--width", "320"), ("--height", "256"), levels):
-        line = refused(noisy_file, *options)
+        line = line_of(noisy_file, *options)
         assert f"{options[0]}: is for bare mosaics" in line
         assert f"not for {noisy_file}" in line
-    assert "holds no bare mosaic" in refused(tmp_path, "--width", "320")
+    assert "holds no bare mosaic" in line_of(tmp_path, "--width", "320")
     for name in ("a", "b"):
         np.full((48, 64), 500, "<u2").tofile(tmp_path / f"{name}.raw")
     for source in (tmp_path, tmp_path / "a.raw"):
-        assert "a.raw: a headerless mosaic needs --width and --height" in refused(source, *levels)
-        assert "needs all three" in refused(source, "--width", "64", "--height", "48")
+        assert "a.raw: a headerless mosaic needs --width and --height" in line_of(source, *levels)
+        assert "needs all three" in line_of(source, "--width", "64", "--height", "48")
     command = ["denoise", str(tmp_path), str(tmp_path / "out"), "--model", str(network), "--quiet", *levels]
     command += ["--profile", "pixel6", "--iso", "800"]
     main([*command, "--width", "64", "--height", "48"])
@@ -528,40 +506,35 @@ def test_importing_the_package_imports_no_pytorch() -> None:
     ],
 )
 def test_a_wrong_option_is_said_once_and_leaves_no_folder(
-    tmp_path: Path, network: Path, options: str, named: str, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, network: Path, options: str, named: str, refused: Callable[..., str]
 ) -> None:
     folder, out = tmp_path / "in", tmp_path / "out"
     folder.mkdir()
     for name in ("a", "b"):
         write_dng(folder / f"{name}.dng", noisy_raw())
         np.save(folder / f"{name}.npy", np.full((48, 64), 500, np.uint16))
-    with pytest.raises(SystemExit) as stop:
-        main(["denoise", str(folder), str(out), "--model", str(network), *options.split()])
-    assert stop.value.code == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert named in line
+    assert named in refused("denoise", folder, out, "--model", network, *options.split())
     assert not out.exists()
 
 
-def test_a_folder_of_which_nothing_can_be_denoised_leaves_none(tmp_path: Path, network: Path) -> None:
+def test_a_folder_of_which_nothing_can_be_denoised_leaves_none(
+    tmp_path: Path, network: Path, refused: Callable[..., str]
+) -> None:
     (tmp_path / "in").mkdir()
     (tmp_path / "in" / "a.dng").write_text("broken")
-    with pytest.raises(SystemExit):
-        main(["denoise", str(tmp_path / "in"), str(tmp_path / "out"), "--model", str(network), "--quiet"])
+    refused("denoise", tmp_path / "in", tmp_path / "out", "--model", network, "--quiet")
     assert not (tmp_path / "out").exists()
 
 
 def test_files_in_subfolders_are_left_out_and_counted(
-    tmp_path: Path, network: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, network: Path, capsys: pytest.CaptureFixture[str], refused: Callable[..., str]
 ) -> None:
     folder = tmp_path / "in"
     for place in ("day1", "day2/raw", ".trash"):
         (folder / place).mkdir(parents=True)
         write_dng(folder / place / "a.dng", noisy_raw())
     command = ["denoise", str(folder), str(folder / "out"), "--model", str(network)]
-    with pytest.raises(SystemExit):
-        main(command)
-    assert f"{folder / 'day1' / 'a.dng'} lies deeper" in capsys.readouterr().err
+    assert f"{folder / 'day1' / 'a.dng'} lies deeper" in refused(*command)
     write_dng(folder / "a.dng", noisy_raw())
     for _ in range(2):  # the second time results lie inside, too
         main(command)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -86,13 +87,12 @@ def test_an_export_that_fails_without_noise_is_refused(
     assert not (tmp_path / "model.onnx").exists()
 
 
-def test_a_network_without_blocks_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_network_without_blocks_is_refused(tmp_path: Path, refused: Callable[..., str]) -> None:
     """The exporter of PyTorch ends with a traceback: there are no averages to take or give."""
     bare = NetworkConfig(width=4, encoder_blocks=(0,), middle_blocks=0, decoder_blocks=(0,))
     save_model(tmp_path / "a.safetensors", RawDenoiser(bare).state_dict(), ModelCard(bare, 16))
-    with pytest.raises(SystemExit, match="2"):
-        main(["export", str(tmp_path / "a.safetensors"), str(tmp_path / "a.onnx")])
-    assert "a.safetensors: has no blocks" in capsys.readouterr().err
+    told = refused("export", tmp_path / "a.safetensors", tmp_path / "a.onnx")
+    assert "a.safetensors: has no blocks" in told
     assert not (tmp_path / "a.onnx").exists()
 
 

@@ -210,7 +210,7 @@ def test_a_display_lights_what_is_before_it_as_a_rectangle_does(renderer: Render
     assert (shaded[bright] < 0.5 * frame.radiance[bright, 0]).mean() > 0.1
 
 
-def test_what_shines_to_both_sides_is_no_display(renderer: Renderer) -> None:
+def test_what_shines_to_both_sides_is_no_display() -> None:
     """A slab with nothing behind it, and one between two cases."""
     slab, case = block((0.4, 0.3, 0.004)), block((0.42, 0.32, 0.01))
     glowing = replace(plain(), emission=5.0)

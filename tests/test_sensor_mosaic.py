@@ -128,7 +128,7 @@ def test_a_halved_mosaic_puts_everything_in_the_middle_of_what_it_covers(axis: i
     np.testing.assert_array_equal(halved(ramp), expected)
 
 
-def test_a_halved_mosaic_keeps_the_light(rng: np.random.Generator) -> None:
+def test_a_halved_mosaic_keeps_the_light() -> None:
     """Every old pixel has a share in the new ones, of which there are a quarter as many."""
     weights = np.zeros((16, 16))
     for i in range(16):

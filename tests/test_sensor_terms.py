@@ -156,7 +156,7 @@ def test_terms_that_no_sensor_has_are_refused(terms):
         NoiseTerms(**terms)
 
 
-def test_switching_one_term_leaves_the_others_noise(tmp_path):
+def test_switching_one_term_leaves_the_others_noise():
     plain, banded = stack(NoiseTerms(), 0.3, 1), stack(NoiseTerms(row=0.0001), 0.3, 1)
     assert np.max(np.abs(plain - banded)) < 1e-3
 
