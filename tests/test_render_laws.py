@@ -176,6 +176,24 @@ def test_a_small_thing_in_the_sun_has_its_shadow_whatever_stands_far_away(render
     assert np.abs(both - alone).max() < 0.4 * alone.max()
 
 
+@pytest.mark.parametrize(("drop_m", "radius"), [(0.2, 0.02), (0.5, 0.04)])
+def test_the_shade_of_a_wall_is_dark_throughout(renderer: Renderer, drop_m: float, radius: float) -> None:
+    """A table in a low sun behind a wall at its edge, over ground: some of what lies around a shaded place is
+    far in front of it, some far behind, and the mean of both says nothing."""
+    sun = Light("sun", (0.0, 0.0, 0.0), (0.9, 0.2, -0.3), (2.0, 2.0, 2.0), radius, 360.0)
+    ground = lambertian(grid(8.0), at=replace(STILL, position_m=(0.0, 0.0, -drop_m)))
+    at_edge = replace(STILL, position_m=(-0.45, 0.0, -0.01))
+    wall = lambertian(block((0.05, 3.0, 0.08)), at=at_edge, object_id=2)
+    distant = lambertian(sphere(0.1), at=replace(STILL, position_m=(-3.0, 1.0, 0.5)), object_id=3)
+    camera = replace(FROM_ABOVE, position_m=(0.0, 0.0, 1.0), fov_deg=50.0)
+    table = lambertian(grid(1.0), object_id=1)
+    frame = draw(renderer, view(ground, table, wall, distant, lights=(sun,), camera=camera))
+    x = floor_points(camera)[..., 0]
+    shaded = binary_erosion((frame.object_id == 1) & (x < -0.425 + 0.9 * 0.07 * 3), iterations=2)
+    assert shaded.mean() > 0.1
+    assert frame.radiance[shaded].max() == 0.0
+
+
 def test_the_sun_s_texels_stay_where_they_are_when_the_camera_moves() -> None:
     """The nearer tile of a camera that has moved a little is that of the first, by whole texels aside."""
     sun = Source(Light("sun", (0.0, 0.0, 0.0), (0.3, -0.6, -0.6), (1.0, 1.0, 1.0), 0.0047, 360.0))

@@ -131,8 +131,7 @@ float visibility(Light light, vec3 position, vec3 face_normal, bool wanted, floa
         blocked_sum += i < taps ? blocked : 0.0;
     } while (++i < taps);
     bool dark = closed || shaded > DARK * float(search_taps);
-    bool mixed = shaded >= TRACE && !dark;
-    float nearer = max(blocked_sum / max(shaded, TRACE) - r.u, 0.0);
+    float nearer = shaded < BEGUN ? 0.0 : max(blocked_sum / shaded - r.u, 0.0);
     mat2 spread = r.spread * nearer;
     float size = max(length(spread[0]), length(spread[1]));
     float wide = clamp(size, 0.75 * r.texel, r.search);
@@ -143,6 +142,9 @@ float visibility(Light light, vec3 position, vec3 face_normal, bool wanted, floa
     float reach = max(1.2 * wide, 1.5 * around);   // to the corners of a block
     Field field = field_at(r, vec2(0), reach);
     float passed = soft_lit(r, field, blocked);
+    // What lies far behind takes what is in front from the means of the search; close by it is seen.
+    shaded = asked ? max(shaded, 1.0 - passed) : 0.0;
+    bool mixed = shaded >= TRACE && !dark;
     bool full = passed < 1.0 - DARK, settled = full || alone(r, field, reach), filtered = mixed && !settled;
 
     float sharp_sum = 0.0, bias = r.bias + (abs(r.slope.x) + abs(r.slope.y)) * r.texel;
