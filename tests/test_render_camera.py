@@ -12,7 +12,7 @@ from scipy.ndimage import center_of_mass, map_coordinates
 from fsid.errors import FsidError
 from fsid.render import Renderer
 from fsid.render.camera import lens_of
-from fsid.render.drawable import View
+from fsid.render.drawable import Drawable, View
 from fsid.render.exposure import Shot, shots_of
 from fsid.render.flow import flow_between
 from fsid.scene import SceneConfig, sample
@@ -123,6 +123,18 @@ def test_vignetting_is_its_polynomial(renderer: Renderer) -> None:
     x = (np.arange(96) + 0.5) / 48 - 1
     r2 = (x[:, None] ** 2 + x**2) / 2
     np.testing.assert_allclose(dim[..., 0] / flat, 1 - 0.3 * r2 + 0.1 * r2**2 - 0.2 * r2**3, rtol=1e-4)
+
+
+def test_what_is_behind_glass_loses_its_light_to_vignetting_once(renderer: Renderer) -> None:
+    """Through a pane a grey floor is as dark in the corners as beside it."""
+    clear = replace(plain(ONE, roughness=20), transmission=1.0)
+    pane = Drawable(grid(8.0), Transform((0.0, 0.0, 1.0), (0.0, 0.0, 0.0), ONE), (clear,), 1)
+    even = view(lambertian(grid(20.0)), pane, ambient=1.0)
+    dim = replace(even, camera=replace(FROM_ABOVE, vignetting=(-0.5, 0.1, -0.2)))
+    x = (np.arange(96) + 0.5) / 48 - 1
+    r2 = (x**2 + x[:, None] ** 2) / 2
+    gain = draw(renderer, dim).radiance / draw(renderer, even).radiance
+    np.testing.assert_allclose(gain[..., 1], 1 - 0.5 * r2 + 0.1 * r2**2 - 0.2 * r2**3, atol=2e-3)
 
 
 def test_aberration_magnifies_red_and_blue(renderer: Renderer) -> None:

@@ -25,6 +25,13 @@ layout(binding = 10) uniform sampler2D sky;   // equirectangular
 uniform float sky_level;  // mip level at which a texel of the sky is a pixel; -1 without sky
 uniform vec3 vignetting;
 uniform float shining;    // 1; 0 in the image that a mirror shows, where lights have highlights instead
+
+// Share of the light that the lens lets through to a place of the image, pixels.
+float gain_at(vec2 place) {
+    vec2 corner = place / vec2(size) * 2.0 - 1.0;
+    float r2 = dot(corner, corner * vec2(size * size)) / dot(vec2(size), vec2(size));
+    return max(1.0 + r2 * (vignetting.x + r2 * (vignetting.y + r2 * vignetting.z)), 0.0);
+}
 #if GLASS
 layout(binding = 11) uniform sampler2D behind;          // as out_radiance
 layout(binding = 12) uniform sampler2D behind_albedo;   // as out_albedo
@@ -75,6 +82,8 @@ vec3 lights_on(Sample p, Reflector b, Blocks blocks, inout bool missing) {
 }
 
 #if GLASS
+const float LEAST_GAIN = 1e-3;   // a lens that is darker shows nothing
+
 // Depth in metres of what is behind at a place of the image, of one pixel: 0, where nothing was hit, is no depth to be
 // blended with others.
 float depth_behind(vec2 at) { return texelFetch(behind, clamp(ivec2(at), ivec2(0), size - 1), 0).a; }
@@ -89,8 +98,8 @@ vec3 seen_through(Sample p, Surface s, vec3 n, vec3 v) {
     float left = max(beyond > 0.0 ? beyond - local.z : 10.0, 0.0) / max(dot(axes[2], -v), 0.1);
     vec2 there = clamp(pixel_of(axes * (p.position + inside * thick - v * left - origin)), vec2(0.5), vec2(size) - 0.5);
     float met = depth_behind(there);
-    bool hidden = met > 0.0 && met < local.z;
-    return texture(behind, (hidden ? here : there) / vec2(size)).rgb;
+    vec2 at = met > 0.0 && met < local.z ? here : there;
+    return texture(behind, at / vec2(size)).rgb / max(gain_at(at), LEAST_GAIN);   // which is in that image already
 }
 #endif
 
@@ -187,9 +196,7 @@ void main() {
         id = labels ? s.object_id : id;
     } while (open != 0u);
     Sample label = all[MIDDLE];
-    vec2 corner = (vec2(pixel) + 0.5) / vec2(size) * 2.0 - 1.0;
-    float r2 = dot(corner, corner * vec2(size * size)) / dot(vec2(size), vec2(size));
-    float gain = max(1.0 + r2 * (vignetting.x + r2 * (vignetting.y + r2 * vignetting.z)), 0.0);
+    float gain = gain_at(vec2(pixel) + 0.5);
 #if OWN == 1
     WRITE(out_radiance, pixel, vec4(sum * (gain / float(COUNT)), 0.0));
 #else
