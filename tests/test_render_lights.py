@@ -14,7 +14,7 @@ from fsid.assets import Mesh, survey_skies
 from fsid.errors import FsidError
 from fsid.render import Renderer
 from fsid.render.drawable import Drawable, background_drawable, panel_drawable, view_of
-from fsid.render.lamps import hoods_apart
+from fsid.render.lamps import hoods_apart, lamps_of
 from fsid.render.room import light_sky
 from fsid.render.sky import angles, panorama
 from fsid.scene import SceneConfig, sample
@@ -208,6 +208,23 @@ def test_a_display_lights_what_is_before_it_as_a_rectangle_does(renderer: Render
     with_shelf = Drawable(joined(slab, case, shelf), at, (glowing, plain(), plain()), 1, specular=0.0)
     shaded = draw(renderer, view(floor, with_shelf)).radiance[..., 0]
     assert (shaded[bright] < 0.5 * frame.radiance[bright, 0]).mean() > 0.1
+
+
+def test_a_mirrored_screen_is_a_mirrored_light() -> None:
+    """What is scaled by -1 along x shines to where the mirror image of what it was shines."""
+    case = moved(block((0.42, 0.32, 0.03)), (0.0, 0.0, -0.0302))
+    materials = (replace(plain(), emission=5.0), plain())
+    lights = []
+    for mirror in (1.0, -1.0):
+        at = Transform((0.0, 0.0, 0.4), (70.0, mirror * 25.0, mirror * 40.0), (mirror, 1.0, 1.0))
+        screen = Drawable(joined(block((0.4, 0.3, 0.004)), case), at, materials, 1)
+        (source,) = lamps_of(hoods_apart([screen]), lambda material: np.array(material.colours[0]), 0.0)
+        lights.append(source.light)
+    one, other = lights
+    assert one.kind == other.kind == "area"
+    np.testing.assert_allclose(other.position_m, np.multiply(one.position_m, (-1, 1, 1)), atol=1e-6)
+    np.testing.assert_allclose(other.direction, np.multiply(one.direction, (-1, 1, 1)), atol=1e-6)
+    np.testing.assert_allclose((other.size_m, other.colour[:2]), (one.size_m, one.colour[:2]), rtol=1e-6)
 
 
 def test_what_shines_to_both_sides_is_no_display() -> None:

@@ -115,6 +115,7 @@ def _display(drawable: Drawable, part: int) -> Display | None:
     """The rectangle of a part that is flat and has a back close behind it and nothing before it."""
     triangles = _triangles(drawable, part)
     doubled = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    doubled *= np.sign(np.prod(drawable.transform.scale))  # a mirrored mesh keeps its order of corners
     areas = np.linalg.norm(doubled, axis=1) / 2
     normals = doubled / np.maximum(2 * areas, 1e-18)[:, None]
     shares, axes = np.linalg.eigh((normals * areas[:, None]).T @ normals)
