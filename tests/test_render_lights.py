@@ -140,6 +140,32 @@ def test_a_shining_surface_lights_its_neighbourhood(renderer: Renderer) -> None:
     np.testing.assert_allclose(above.radiance[48, 48], 4.0, rtol=1e-3)
 
 
+def test_a_hollow_lamp_gives_as_much_light_as_a_solid_one(renderer: Renderer) -> None:
+    """What shines inside a ball of two walls stays there."""
+    glowing = replace(plain((0.8, 0.8, 0.8)), emission=5.0)
+    wall, inner = sphere(0.1), sphere(0.098)
+    lining = replace(inner, normals=-inner.normals, faces=inner.faces[:, ::-1].copy())
+    both = joined(wall, lining)
+    shell = replace(both, face_parts=np.zeros_like(both.face_parts), part_names=("shell",))
+    at = Transform((0.0, 0.0, 1.0), (0, 0, 0), ONE)
+    camera = replace(SMALL, position_m=(1.5, 0.0, 1.2), target_m=(1.0, 0.0, 0.0))
+    solid, hollow = (
+        draw(renderer, view(lambertian(grid(8.0)), Drawable(mesh, at, (glowing,), 1), camera=camera)).radiance
+        for mesh in (wall, shell)
+    )
+    assert solid.min() > 0
+    np.testing.assert_allclose(hollow, solid, rtol=0.03)
+
+
+def test_a_sheet_shines_to_both_sides(renderer: Renderer) -> None:
+    """60 degrees off its normal a sheet of radiance L and area A has the intensity L A / 2, its mean."""
+    glowing = replace(plain((0.8, 0.8, 0.8)), emission=5.0)
+    sheet = Drawable(grid(0.1), Transform((0.0, 0.0, 1.0), (60.0, 0.0, 0.0), ONE), (glowing,), 1)
+    camera = Camera((0.0, 0.6, 0.5), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 1.0, 16, 16)
+    frame = draw(renderer, view(lambertian(grid(8.0)), sheet, camera=camera))
+    np.testing.assert_allclose(frame.radiance[8, 8], 0.5 / np.pi * 4.0 * 0.1**2 / 2, rtol=0.02)
+
+
 def test_the_hood_of_a_lamp_shades_its_light(renderer: Renderer) -> None:
     """A square of 0.6 m, 0.3 m below a bulb that is 1 m above the floor, shades a square of 2 m there; what
     is translucent shades nothing of its own bulb."""

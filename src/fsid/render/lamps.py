@@ -1,10 +1,11 @@
 """Surfaces that shine light their neighbourhood: each becomes a light of the same power.
 
-    I = L A / 4      mean radiant intensity of a convex body of surface A and radiance L
+    I = L A / 4      mean radiant intensity of a body of radiance L and convex hull A (Cauchy 1832)
 
 placed at its centroid, as large as a sphere of that surface, and shaded by everything but itself and what
-it touches. A flat one with something behind it, as the display of a screen, becomes an area light in its
-place, which shines to the front alone and is shaded by the rest of its own object, too.
+it touches. The inside of a shade shines on itself and out of its openings, which the hull closes; of a sheet
+both sides shine. A flat one with something behind it, as the display of a screen, becomes an area light in
+its place, which shines to the front alone and is shaded by the rest of its own object, too.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial import ConvexHull, QhullError
 from trimesh.triangles import closest_point
 
 from fsid.assets import Mesh
@@ -26,6 +28,9 @@ MAX_LAMPS = 12
 
 _FLAT = 0.8
 """Share of a surface that faces one way, to and fro, from which on it is flat."""
+
+_ROUND = 0.95
+"""A convex hull smaller than this part of the surface is that of a hollow body, not of too few corners."""
 
 _BEHIND = 0.3
 """How far behind a display its back is looked for, relative to the edge of a square of its size."""
@@ -183,15 +188,45 @@ def _pieces(drawable: Drawable, wanted: np.ndarray) -> Drawable:
 
 
 def _extent(drawable: Drawable, part: int) -> tuple[np.ndarray, float]:
-    """Centroid (3,) of a part, metres before the drawable is turned and moved, and its surface in m^2."""
+    """Centroid (3,) of a part, metres before the drawable is turned and moved, and in m^2 the surface of the
+    convex body that is seen as much of: its hull, or its own where that is less, as of several bulbs."""
     points = _triangles(drawable, part)
     cross = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
     areas = np.linalg.norm(cross, axis=1) / 2
     total = float(areas.sum())
-    return (points.mean(1) * areas[:, None]).sum(0) / max(total, 1e-12), total
+    closed = total + float(np.linalg.norm(cross.sum(0))) / 2  # with what closes its opening
+    hull = _hull_area(_vertices(drawable, part))
+    centroid = (points.mean(1) * areas[:, None]).sum(0) / max(total, 1e-12)
+    return centroid, hull if hull < _ROUND * closed else closed
+
+
+def _vertices(drawable: Drawable, part: int) -> np.ndarray:
+    """(V, 3) metres, as `_extent`."""
+    mesh = drawable.mesh
+    used = np.unique(mesh.faces[mesh.face_parts == part])
+    return np.asarray(mesh.vertices[used] * np.array(drawable.transform.scale, np.float32))
+
+
+def _hull_area(points: np.ndarray) -> float:
+    """m^2, of the points (V, 3) that lie farthest in fixed directions; infinite where these are flat."""
+    corners = np.unique((points @ _DIRECTIONS.T).argmax(0))
+    try:
+        return float(ConvexHull(points[corners]).area)
+    except QhullError:
+        return np.inf
 
 
 def _triangles(drawable: Drawable, part: int) -> np.ndarray:
     """(F, 3, 3) metres, as `_extent`."""
     mesh = drawable.mesh
     return np.asarray(mesh.vertices[mesh.faces[mesh.face_parts == part]] * np.array(drawable.transform.scale))
+
+
+def _evenly_spread(count: int) -> np.ndarray:
+    """(count, 3) unit vectors on a spiral."""
+    z = (np.arange(count) + 0.5) / count * 2 - 1
+    turn = np.arange(count) * np.pi * (3 - np.sqrt(5))
+    return np.stack([np.sqrt(1 - z * z) * np.cos(turn), np.sqrt(1 - z * z) * np.sin(turn), z], axis=-1)
+
+
+_DIRECTIONS = _evenly_spread(256).astype(np.float32)
