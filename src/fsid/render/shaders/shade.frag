@@ -43,9 +43,12 @@ OUTPUT(1, rgba16, out_albedo);     // a: (object id + 1) / 65535
 OUTPUT(2, rgba16, out_normal);     // camera space, 0.5 + 0.5 n
 #endif
 
+const float LEFT_OUT = OWN == 0 ? 0.0 : 1.0;   // share of a light up to which it is not visited
+
 // Light of all lights. First those whose shadow is interpolated; the others need their own, which costs much
 // more, one after the other: lights differ from pixel to pixel in that loop, so that it is short. Where only
-// these count (OWN 1 and 2) the first loop does no more than find them.
+// these count (OWN 1 and 2) the first loop does no more than find them. Lights that a pixel does not need are left out
+// of its loop, which is as long as that of the pixel beside it that needs most.
 // missing: whether some were left out.
 vec3 lights_on(Sample p, Reflector b, Blocks blocks, inout bool missing) {
     vec3 sum = vec3(0);
@@ -55,16 +58,21 @@ vec3 lights_on(Sample p, Reflector b, Blocks blocks, inout bool missing) {
         uint left = 0u;
         do {
             vec4 four = interpolated(blocks, i / 4);
-            do {
-                float lit = four[i & 3];
-                bool wanted = i < light_count;
+            uint some = 0u;     // of these four lights
+            for (int k = 0; k < 4; ++k) some |= i + k < light_count && four[k] > LEFT_OUT ? 1u << k : 0u;
 #if OWN == 0
-                vec3 light = returned(light_at(i), p, b);
-                wanted = wanted && max(light.r, max(light.g, light.b)) > 0.0;
-                sum += wanted && lit <= 1.0 ? lit * light : vec3(0);
+            do {
+                int k = max(findLSB(some), 0);
+                vec3 light = returned(light_at(i + k), p, b);
+                bool wanted = some != 0u && max(light.r, max(light.g, light.b)) > 0.0;
+                sum += wanted && four[k] <= 1.0 ? four[k] * light : vec3(0);
+                left |= wanted && four[k] > 1.0 ? 1u << (i + k - first) : 0u;
+                some &= some - 1u;
+            } while (some != 0u);
+#else
+            left |= some << (i - first);
 #endif
-                left |= wanted && lit > 1.0 ? 1u << (i - first) : 0u;
-            } while ((++i & 3) != 0 && i < light_count);
+            i += 4;
         } while (i < min(light_count, first + 32));
         missing = missing || left != 0u;
 #if OWN
