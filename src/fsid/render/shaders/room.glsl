@@ -45,7 +45,8 @@ vec3 mirrored(vec3 position, vec3 r, float alpha) {
                              zx[0] * zx[1] * zy[0] * zy[2], zx[2] * zx[3] * zy[1] * zy[3]);
     int first = t.x <= reach ? 0 : t.y <= reach ? 2 : 4;
     uint left = 1u << (first + (ray[first / 2] < 0.0 ? 1 : 0));
-    for (int side = 0; side < 6; ++side) left |= share[side] > LEAST_WALL ? 1u << side : 0u;
+    float whole = smoothstep(0.0, 0.4, alpha);    // from 1 on no single wall counts
+    for (int side = 0; side < 6; ++side) left |= share[side] > LEAST_WALL && whole < 1.0 ? 1u << side : 0u;
     vec4 wall = vec4(0);
     do {
         int side = findLSB(left), axis = side / 2;
@@ -53,7 +54,7 @@ vec3 mirrored(vec3 position, vec3 r, float alpha) {
         vec2 uv = vec2(at[(axis + 1) % 3], at[(axis + 2) % 3]);
         wall += (share[side] + 1e-6) * vec4(textureLod(room_radiance, vec3(uv, side), level).rgb, 1.0);
     } while (left != 0u);
-    return mix(wall.rgb / wall.a, cube(mean_sides, r), smoothstep(0.0, 0.4, alpha));
+    return mix(wall.rgb / wall.a, cube(mean_sides, r), whole);
 }
 
 // Share of the surroundings that a surface reflects specularly: scale and offset of f0, and that of a clear coat

@@ -128,10 +128,20 @@ vec3 radiance(Sample p, Surface s, Matter m, float spread, inout bool missing) {
 #if OWN == 1
     return light;
 #endif
-    vec3 surroundings = cube(ambient_sides, b.n) * b.diffuse + b.mirror * surroundings_in(p, b.r, b.alpha);
 #if LOBES
-    surroundings = surroundings * b.below + b.coat * surroundings_in(p, b.r, b.coat_alpha)
-                 + b.cloth * cube(ambient_sides, b.n) + b.through * cube(ambient_sides, -b.n);
+    vec3 in_body = vec3(0), in_coat = vec3(0);
+    bool coat = false;
+    do {    // once more where there is a coat: a branch would always run
+        vec3 shown = surroundings_in(p, b.r, coat ? b.coat_alpha : b.alpha);
+        in_body = coat ? in_body : shown;
+        in_coat = coat ? shown : in_coat;
+        coat = !coat;
+    } while (coat && b.coat > 0.0);
+    vec3 even = cube(ambient_sides, b.n);
+    vec3 surroundings = (even * b.diffuse + b.mirror * in_body) * b.below + b.coat * in_coat
+                      + b.cloth * even + b.through * cube(ambient_sides, -b.n);
+#else
+    vec3 surroundings = cube(ambient_sides, b.n) * b.diffuse + b.mirror * surroundings_in(p, b.r, b.alpha);
 #endif
     vec3 result = light + openness(blocks, p.depth) * surroundings;
 #if GLASS
