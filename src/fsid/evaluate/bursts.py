@@ -1,7 +1,7 @@
 """A test set from captures: the truth is the robust mean of a burst, with its own error bar.
 
     truth = mean_f clip((x_f - o_f) / g_f),         clip: within 4 sigma of the first mean
-    error^2 = sigma^2 / F + error^2(g, o) / 2 + |T truth - truth|^2
+    error^2 = sigma^2 / F + error^2(g, o) / 2 + |x_0 - truth|^2 without noise
                                                     half of the second: the noise of the first frame
 
     CAPTURES/<scene>/<level>/*.dng        one burst each: static scene, locked focus, exposure and ISO
@@ -9,9 +9,9 @@
 The first frame of a burst is the noisy test frame and stays out of the truth, else its noise would be the
 truth's, too; further ones are the first that lie on it in the same light. g_f is the flicker of the light,
 o_f the drift of the black level; a frame that moved is shifted back where the shift is a whole number of CFA
-tiles (`placing`), and left out where it is not, since interpolating would blur the truth. What is left, less
-than a sixth of a tile, the first frame may lie beside all others: T would move the truth onto it. Truth and
-noisy frames are cut to what all frames show.
+tiles (`placing`), and left out where it is not, since interpolating would blur the truth. By what is left,
+less than a sixth of a tile or hidden by noise, the first frame lies beside the truth, which is blurred by it:
+the third part of the error (`beside`). Truth and noisy frames are cut to what all frames show.
 """
 
 from __future__ import annotations
@@ -23,11 +23,12 @@ from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
-from scipy.ndimage import shift, uniform_filter
+from scipy.ndimage import uniform_filter
 
 from fsid.counted import counted
 from fsid.errors import FsidError
-from fsid.evaluate.placing import LEAST_FRAMES, Placed, Window, green, misplaced, place, read_first, too_few
+from fsid.evaluate.beside import beside2, sampled
+from fsid.evaluate.placing import LEAST_FRAMES, Placed, Window, place, read_first, too_few
 from fsid.evaluate.testset import Progress, TestImage, TestSet, staged, write_testset
 from fsid.files import write_atomically
 from fsid.sensor import (
@@ -37,7 +38,6 @@ from fsid.sensor import (
     estimate_noise,
     exact_levels,
     load_profile,
-    pack,
     read_raw,
     write_dng,
 )
@@ -45,6 +45,8 @@ from fsid.sensor.blind import stated_noise
 from fsid.sensor.frames import BESIDE_RAW
 
 OUTLIER_SIGMA = 4.0
+SPECK_SIGMA = 10.0
+"""Of noise: as much a pixel may count for a first frame that lies beside the truth; more is a cosmic ray."""
 MAX_NOISY_FLICKER = 0.01
 """Largest difference in brightness of a noisy frame from the first, whose light the truth has."""
 _PATCH_TILES = 7
@@ -130,22 +132,10 @@ def average(
     if len(placed) < LEAST_FRAMES:
         raise too_few(reference, every)
     window = _common_window(placed, first)
-    mean, variance = _moments(placed, window)
-    used, total, square = (np.zeros(mean.shape) for _ in range(3))
-    for x in _frames(placed, window):
-        deviation = x - mean
-        kept = _is_like_the_others(deviation, variance, len(placed))
-        used += kept
-        total += np.where(kept, deviation, 0)
-        square += np.where(kept, deviation**2, 0)
-    change = total / np.maximum(used, 1)
-    truth = (mean + change).astype(np.float32)
-    spread = np.where(used > 1, (square - total * change) / np.maximum(used - 1, 1), variance)
-    noise2 = float(np.mean(spread / np.maximum(used, 1)))
-    shared2 = float(np.mean([p.error2 for p in placed])) / 2
     seen = _cut(first, window)
-    result = replace(seen, mosaic=truth, noise=None)
-    error = float(np.sqrt(noise2 + shared2 + _misplacement2(result, seen)))
+    mean = _trimmed_mean(placed, window, seen.mosaic)
+    shared2 = float(np.mean([p.error2 for p in placed])) / 2
+    error = float(np.sqrt(mean.noise2 + shared2 + mean.beside2))
     quality = TruthQuality(
         image=image,
         level=level,
@@ -153,21 +143,47 @@ def average(
         left_out=len(paths) - len(placed),
         error=error,
         psnr=float(-20 * np.log10(max(error, 1e-9))),
-        outliers=float(1 - used.mean() / len(placed)),
+        outliers=mean.outliers,
         flicker=max(abs(p.gain - 1) for p in placed),
         shift_px=float(max(np.hypot(*p.roll) for p in placed)),
     )
-    return result, quality, window
+    return replace(seen, mosaic=mean.truth, noise=None), quality, window
 
 
-def _misplacement2(truth: Raw, first: Raw) -> float:
-    """Mean square of what lies between the truth and the first frame because it moved by a part of a tile."""
-    tiles = misplaced(green(truth), green(first))
-    planes, seen = (pack(raw.mosaic, raw.cfa) for raw in (truth, first))
-    moved = np.stack([shift(plane, -tiles, order=3, mode="nearest") for plane in planes]) - planes
-    square = float(np.mean(moved**2, dtype=np.float64))
-    share = float(np.mean(moved * (seen - planes), dtype=np.float64)) / max(square, 1e-30)
-    return square * min(max(share, 0.0), 1.0) ** 2
+@dataclass(frozen=True, eq=False)
+class _Mean:
+    """truth: (H, W) float32. outliers: share of samples left out. noise2, beside2: mean squares of the noise
+    that is left in it, and of how far the first frame lies beside it."""
+
+    truth: np.ndarray
+    outliers: float
+    noise2: float
+    beside2: float
+
+
+def _trimmed_mean(placed: Sequence[Placed], window: Window, first: np.ndarray) -> _Mean:
+    mean, variance = _moments(placed, window)
+    used, total, square = (np.zeros(mean.shape) for _ in range(3))
+    samples = []
+    for x in _frames(placed, window):
+        deviation = x - mean
+        kept = _is_like_the_others(deviation, variance, len(placed))
+        used += kept
+        total += np.where(kept, deviation, 0)
+        square += np.where(kept, deviation**2, 0)
+        samples.append(sampled(np.where(kept, deviation, 0)))
+    change = total / np.maximum(used, 1)
+    spread = np.where(used > 1, (square - total * change) / np.maximum(used - 1, 1), variance)
+    unlike = float(np.mean(spread**2) / max(np.mean(spread) ** 2, 1e-30))
+    reach = SPECK_SIGMA * np.sqrt(_spread_over_site(variance))
+    off = sampled(change)
+    others, gains = [sample - off for sample in samples], [p.gain for p in placed]
+    return _Mean(
+        truth=(mean + change).astype(np.float32),
+        outliers=float(1 - used.mean() / len(placed)),
+        noise2=float(np.mean(spread / np.maximum(used, 1))),
+        beside2=beside2(sampled((first - mean - change).clip(-reach, reach)), others, gains, unlike),
+    )
 
 
 def _find_bursts(captures: Path, frames: int) -> dict[tuple[str, str], list[Path]]:

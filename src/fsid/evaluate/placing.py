@@ -184,7 +184,7 @@ def _brings_nearer(whole: np.ndarray, ours: np.ndarray, theirs: np.ndarray) -> b
     """Whether `ours` rolled by `whole` differs less from `theirs` than it does in place, beyond noise."""
     seen = _shown(whole)
     rolled = np.roll(ours, tuple(whole), axis=(0, 1))
-    here, there = (_unbanded((plane - theirs)[seen]) for plane in (ours, rolled))
+    here, there = (unbanded((plane - theirs)[seen]) for plane in (ours, rolled))
     gained = here**2 - there**2
     return bool(gained.mean() > SIGNIFICANT * gained.std() / np.sqrt(gained.size))
 
@@ -201,26 +201,20 @@ def _lies_beside(ours: np.ndarray, theirs: np.ndarray) -> bool:
     return bool(total @ np.linalg.pinv(scores.T @ scores) @ total > SIGNIFICANT**2)
 
 
-def misplaced(ours: np.ndarray, theirs: np.ndarray) -> np.ndarray:
-    """Rows and columns, parts of one, by which `ours` lies further than `theirs`; (h, w) of like light."""
-    slopes, change = _less_light(uniform_filter(ours - theirs, 3), theirs)
-    return -np.linalg.lstsq(slopes, change, rcond=None)[0].ravel()
-
-
 def _less_light(change: np.ndarray, theirs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The smoothed gradient of `theirs` (h w, 2) and its `change` (h w, 1): -shift . gradient + noise.
 
     What of both looks like another light is taken out.
     """
     smooth = uniform_filter(theirs.astype(np.float64), 3)
-    slopes = np.stack([_unbanded(slope).ravel() for slope in np.gradient(smooth)], axis=1)
-    light = _unbanded(smooth).reshape(-1, 1)
-    both = (slopes, _unbanded(change).reshape(-1, 1))
+    slopes = np.stack([unbanded(slope).ravel() for slope in np.gradient(smooth)], axis=1)
+    light = unbanded(smooth).reshape(-1, 1)
+    both = (slopes, unbanded(change).reshape(-1, 1))
     slopes, change = (v - light @ np.linalg.lstsq(light, v, rcond=None)[0] for v in both)
     return slopes, change
 
 
-def _unbanded(plane: np.ndarray) -> np.ndarray:
+def unbanded(plane: np.ndarray) -> np.ndarray:
     """A plane (h, w) less the means of its rows and columns, whose noise is common to many pixels.
 
     Stripes that run from edge to edge along the pixels are lost with it, and tell no shift.
