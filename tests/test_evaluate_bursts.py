@@ -100,6 +100,25 @@ def test_fine_print_before_a_camera_that_moves_limits_the_truth(clean: Raw, tmp_
     assert quality.psnr == pytest.approx(psnr(truth.mosaic, pages[0]), abs=1)
 
 
+@pytest.mark.parametrize("row", [0.0, 0.2])
+def test_bands_of_a_flickering_lamp_limit_the_truth(clean: Raw, tmp_path: Path, row: float):
+    """A rolling shutter makes rows of it, in every frame at another place; noise of rows limits nothing."""
+    rng = np.random.default_rng(1)
+    bands = [
+        1 + (0 if row else 0.03) * np.sin(np.arange(96) / 9 + phase)[:, None]
+        for phase in rng.uniform(0, 2 * np.pi, FRAMES)
+    ]
+    paths = _burst(
+        tmp_path / "b",
+        clean,
+        lambda raw, f: replace(raw, mosaic=(raw.mosaic * bands[f]).astype(np.float32)),
+        iso=400,
+        terms=NoiseTerms(row=row),
+    )
+    truth, quality, _ = average(paths[1:], paths[0])
+    assert quality.psnr == pytest.approx(psnr(truth.mosaic, clean.mosaic * bands[0]), abs=1)
+
+
 def test_flicker_is_divided_out(clean: Raw, tmp_path: Path):
     flicker = 1 + 0.08 * np.sin(np.arange(FRAMES) * 2.0)
     flicker[0] = 1

@@ -8,11 +8,15 @@ v (1 + sqrt(F / N))^2 (Marchenko & Pastur 1967). A hand that trembles or a tripo
 of one picture, however fine they are, so that few eigenvectors, far above that end, hold all of it. (The
 gradient of the truth tells too little of it: text is finer than the pixels of a site.) A first frame that
 differs from the others in its own way is an eigenvector by itself.
+
+Rows and columns count by themselves: what a pixel has of its own tells more sharply without them. Noise that
+they have in common is another one in each frame, and the flicker of a lamp in a rolling shutter is not.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,24 +27,53 @@ _PIXELS = 200_000
 _BEYOND = 2.0
 """Times the square root above: pixels of other noise than the rest, and frames of other light, widen it."""
 
-
-def sampled(deviation: np.ndarray) -> np.ndarray:
-    """(n,) pixels of a frame less the truth (H, W), without what rows and columns have in common."""
-    sites = [unbanded(deviation[row::2, column::2]).ravel() for row in (0, 1) for column in (0, 1)]
-    pixels = np.concatenate(sites)
-    return pixels[:: -(-pixels.size // _PIXELS)].astype(np.float32)
+_SITES = 2.0
+"""In which a row is, or a column, and its noise is the same."""
 
 
-def beside2(first: np.ndarray, others: Sequence[np.ndarray], gains: Sequence[float], spread: float) -> float:
-    """Mean square by which the first frame lies beside the mean of the others, but for noise.
+@dataclass(frozen=True, eq=False)
+class Departure:
+    """A frame less the truth: (n,) pixels without what their rows and columns have in common, and that of
+    rows and of columns without the mean of all. Their mean squares add up to that of the frame."""
 
-    first, others: `sampled`, F >= 3 others. gains: what the others were divided by. spread: mean square of
-    the noise variance of the pixels, over the square of its mean: 1 where all have the same.
+    pixels: np.ndarray
+    rows: np.ndarray
+    columns: np.ndarray
+
+    @staticmethod
+    def of(frame: np.ndarray) -> Departure:
+        """Of a frame less the truth (H, W)."""
+        sites = [frame[row::2, column::2] for row in (0, 1) for column in (0, 1)]
+        pixels = np.concatenate([unbanded(site).ravel() for site in sites])
+        rows, columns = (
+            np.concatenate([site.mean(axis=axis) - site.mean() for site in sites]) for axis in (1, 0)
+        )
+        return Departure(pixels[:: -(-pixels.size // _PIXELS)].astype(np.float32), rows, columns)
+
+    def less(self, other: Departure) -> Departure:
+        """That of a truth which departs from this one's by `other`."""
+        return Departure(self.pixels - other.pixels, self.rows - other.rows, self.columns - other.columns)
+
+
+def beside2(first: Departure, others: Sequence[Departure], gains: Sequence[float], spread: float) -> float:
+    """Mean square by which the first frame lies beside the mean of the F >= 3 others, but for noise.
+
+    gains: what the others were divided by. spread: mean square of the noise variance of the pixels, over the
+    square of its mean: 1 where all have the same.
     """
+    light = np.log(gains)
+    return (
+        _beside2(first.pixels, [other.pixels for other in others], light, spread)
+        + _beside2(first.rows, [other.rows for other in others], light, _SITES)
+        + _beside2(first.columns, [other.columns for other in others], light, _SITES)
+    )
+
+
+def _beside2(first: np.ndarray, others: Sequence[np.ndarray], light: np.ndarray, spread: float) -> float:
     count = len(others)
     share = (count + 1) / count  # of noise, and of what first and mean differ by: the mean has some, too
     frames = np.stack([first / np.float32(np.sqrt(share)), *others])
-    frames[1:] *= _of_like_noise(frames[1:], np.log(gains))[:, None]
+    frames[1:] *= _of_like_noise(frames[1:], light)[:, None]
     values, vectors = np.linalg.eigh((frames @ frames.T).astype(np.float64) / first.size)
     noise2 = values[1 + count // 4]  # the least is 0: the others' deviations from their mean add up to it
     end = noise2 * (1 + _BEYOND * np.sqrt(count * spread / first.size)) ** 2

@@ -27,7 +27,7 @@ from scipy.ndimage import uniform_filter
 
 from fsid.counted import counted
 from fsid.errors import FsidError
-from fsid.evaluate.beside import beside2, sampled
+from fsid.evaluate.beside import Departure, beside2
 from fsid.evaluate.placing import LEAST_FRAMES, Placed, Window, place, read_first, too_few
 from fsid.evaluate.testset import Progress, TestImage, TestSet, staged, write_testset
 from fsid.files import write_atomically
@@ -164,25 +164,25 @@ class _Mean:
 def _trimmed_mean(placed: Sequence[Placed], window: Window, first: np.ndarray) -> _Mean:
     mean, variance = _moments(placed, window)
     used, total, square = (np.zeros(mean.shape) for _ in range(3))
-    samples = []
+    departures = []
     for x in _frames(placed, window):
         deviation = x - mean
         kept = _is_like_the_others(deviation, variance, len(placed))
         used += kept
         total += np.where(kept, deviation, 0)
         square += np.where(kept, deviation**2, 0)
-        samples.append(sampled(np.where(kept, deviation, 0)))
+        departures.append(Departure.of(np.where(kept, deviation, 0)))
     change = total / np.maximum(used, 1)
     spread = np.where(used > 1, (square - total * change) / np.maximum(used - 1, 1), variance)
     unlike = float(np.mean(spread**2) / max(np.mean(spread) ** 2, 1e-30))
     reach = SPECK_SIGMA * np.sqrt(_spread_over_site(variance))
-    off = sampled(change)
-    others, gains = [sample - off for sample in samples], [p.gain for p in placed]
+    off = Departure.of(change)
+    others, gains = [departure.less(off) for departure in departures], [p.gain for p in placed]
     return _Mean(
         truth=(mean + change).astype(np.float32),
         outliers=float(1 - used.mean() / len(placed)),
         noise2=float(np.mean(spread / np.maximum(used, 1))),
-        beside2=beside2(sampled((first - mean - change).clip(-reach, reach)), others, gains, unlike),
+        beside2=beside2(Departure.of((first - mean - change).clip(-reach, reach)), others, gains, unlike),
     )
 
 
