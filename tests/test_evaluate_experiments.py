@@ -12,6 +12,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
+from skimage import data
 
 from fsid.cli.main import main
 from fsid.cli.progress import progress_bar
@@ -23,6 +25,7 @@ from fsid.evaluate.dead_leaves import RADIUS_PX, dead_leaves_rand, write_dead_le
 from fsid.evaluate.demo import ISOS, DemoConfig, _copy_photographs
 from fsid.evaluate.experiment_report import gaps
 from fsid.evaluate.experiments import PHOTOGRAPHS, TEST_ISOS, _data, _read_images, _training, scale_config
+from fsid.evaluate.known import known_pictures
 from fsid.sensor import load_profile, save_profile
 
 SMOKE = ("--scale", "smoke", "--count", "2", "--steps", "3", "--quiet")
@@ -65,6 +68,7 @@ def test_synthetic_against_real_goes_on_where_it_was_stopped(photos: Path, tmp_p
     assert "2 pairs of 128x96 pixels per source (from photographs 3 of up to 1024x1024)" in page
     assert "network nafnet-tiny, 3 steps, seeds 3, camera pixel6, network.width=8, " in page
     assert "the paper&#39;s gap" in page
+    assert "3 of 3 test photographs of other are trained on by the real rival, which flatters it" in page
     by = {(r["model"], r["level"]): r["psnr"] for r in rows if r["set"] == "other"}
     gap = {iso: by["full-seed3", f"iso{iso}"] - by["photographs-seed3", f"iso{iso}"] for iso in TEST_ISOS}
     shown = re.findall(r"<td>([+-]\d+\.\d\d)</td><td>([+-]\d+\.\d\d) \(ISO (\d+)\)</td>", page)
@@ -84,6 +88,21 @@ def test_synthetic_against_real_goes_on_where_it_was_stopped(photos: Path, tmp_p
     next(held_back.iterdir()).unlink()
     said = refused(*command)
     assert f"{held_back}: holds other photographs than those that {out}/testsets/other was made of" in said
+
+
+def test_test_photographs_that_were_trained_on_are_found_as_copies(photos: Path, tmp_path: Path):
+    training = sorted(photos.iterdir())
+    blank = tmp_path / "blank.png"
+    Image.new("RGB", (200, 160), (90, 90, 90)).save(blank)
+    turned = tmp_path / "turned.png"
+    seen = Image.open(training[2])
+    seen.rotate(180).save(turned)
+    smaller, other = tmp_path / "smaller.jpg", tmp_path / "other.jpg"
+    seen.resize((131, 105)).save(smaller, quality=70)
+    Image.fromarray(data.astronaut()[:160, :200]).save(other)
+    tests = [turned, smaller, blank, other, tmp_path / "missing.png"]
+    assert known_pictures(tests, [*training[:2], blank], 2) == []
+    assert known_pictures(tests, [*training, blank], 2) == [(smaller, training[2])]
 
 
 def test_a_demo_is_gone_on_with_by_the_same_command_alone(tmp_path: Path, refused):

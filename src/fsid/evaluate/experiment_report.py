@@ -36,10 +36,12 @@ def write_experiment_report(
     pairs: Mapping[str, int],
     rows: Sequence[Row],
     images: Sequence[ImageRow],
+    known: str = "",
 ) -> Path:
     """Gaps of "full" to its rivals, the means over seeds with their spread, and plots; one file.
 
-    pairs: how many every source has, in the order of the tables.
+    pairs: how many every source has, in the order of the tables. known: what is said of test photographs that
+    a rival has seen.
     """
     results = _Results(config.seeds, tuple(pairs), tuple(rows), tuple(images))
     materials = results.levels[ALL_SETS]
@@ -49,7 +51,8 @@ def write_experiment_report(
     if single:
         sections.append(_by_material(results, single))
     title = "FSID: ablation" if config.kind == "ablation" else "FSID: synthetic against real"
-    write_report(file, title, _lead(config, pairs), sections)
+    lead = f"{_lead(config, pairs)} {known}." if known else _lead(config, pairs)
+    write_report(file, title, lead, sections)
     return file
 
 

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Literal
 
 from fsid.config import Override, check_fields, given_keys, load_settings
+from fsid.counted import counted
 from fsid.dataset import (
     RENDERED,
     GenerateConfig,
@@ -47,10 +48,11 @@ from fsid.evaluate.compare import (
 )
 from fsid.evaluate.dead_leaves import write_dead_leaves
 from fsid.evaluate.experiment_report import write_experiment_report
+from fsid.evaluate.known import known_pictures
 from fsid.evaluate.models import model_method
 from fsid.evaluate.simulated import LUXES, simulated_testset
 from fsid.evaluate.testbench import MATERIALS
-from fsid.evaluate.testset import ALL_SETS, levels_of, photo_testset, read_testset
+from fsid.evaluate.testset import ALL_SETS, as_text, levels_of, photo_testset, read_testset
 from fsid.files import make_folder, read_whole
 from fsid.scene import VARIANTS
 from fsid.sensor import load_bayer_profile
@@ -146,6 +148,23 @@ def scale_config(kind: Kind, scale: str) -> ExperimentConfig:
     raise FsidError(f"--scale {scale}: choose smoke, cpu or paper")
 
 
+def photographs_known(config: ExperimentConfig, *, workers: int = 1) -> str:
+    """In words, which test photographs the real rival is trained on, as copies; "" where none is found."""
+    if PHOTOGRAPHS not in SOURCES[config.kind]:
+        return ""
+    training = find_pictures(Path(config.photos))
+    said = []
+    for folder in config.tests:
+        tests = find_photos(folder)
+        if known := known_pictures(tests, training, max(min(workers, os.cpu_count() or 1), 1)):
+            test, theirs = (as_text(path.name) for path in known[0])
+            said.append(
+                f"{len(known)} of {counted(len(tests), 'test photograph')} of {as_text(_set_name(folder))} "
+                f"are trained on by the real rival, which flatters it ({test} is its {theirs})"
+            )
+    return "; ".join(said)
+
+
 @contextmanager
 def _silent(label: str, unit: str) -> Iterator[Callable[[int, int], None]]:
     yield lambda done, total: None
@@ -187,7 +206,8 @@ def _run(out: Path, config: ExperimentConfig, bar: ProgressBar, workers: int) ->
     write_results(rows, out / "results.json")
     write_images(images, out / "images.csv")
     pairs = {source: _count(config, source) for source in SOURCES[config.kind]}
-    return write_experiment_report(out / "report.html", config, pairs, rows, images)
+    known = photographs_known(config, workers=workers)
+    return write_experiment_report(out / "report.html", config, pairs, rows, images, known)
 
 
 def _check(out: Path, config: ExperimentConfig, bar: ProgressBar, workers: int) -> None:
