@@ -142,7 +142,9 @@ float visibility(Light light, vec3 position, vec3 face_normal, bool wanted, floa
     float reach = max(1.2 * wide, 1.5 * around);   // to the corners of a block
     Field field = field_at(r, vec2(0), reach);
     float passed = soft_lit(r, field, blocked);
-    // What lies far behind takes what is in front from the means of the search; close by it is seen.
+    // What lies far behind takes what is in front from the means of the search; close by it is seen, by each pixel
+    // for itself: a block that has other surfaces close by, and in which the search found nothing, speaks for none.
+    bool doubtful = taps > 0 && shaded < BEGUN && !alone(r, field, reach);
     shaded = asked ? max(shaded, 1.0 - passed) : 0.0;
     bool mixed = shaded >= TRACE && !dark;
     bool full = passed < 1.0 - DARK, settled = full || alone(r, field, reach), filtered = mixed && !settled;
@@ -170,6 +172,6 @@ float visibility(Light light, vec3 position, vec3 face_normal, bool wanted, floa
 
     float followed = mixed ? 0.5 * (wide + r.texel) : taps > 0 ? r.search : farthest;
     bool same = mixed && (settled || lit >= 1.0 && passed >= 1.0);
-    even = !wanted || !r.inside || followed >= around || same;
+    even = !wanted || !r.inside || !doubtful && (followed >= around || same);
     return lit;
 }
