@@ -123,7 +123,8 @@ def read_samples(path: Path) -> dict[str, dict[str, bytes]]:
 
 
 def each_sample(path: Path) -> Iterator[tuple[str, dict[str, bytes]]]:
-    """The samples of a shard of `write_shard` one after the other: all at once take ten times the memory."""
+    """The samples of a shard of `write_shard` one after the other, so that one is in memory. FsidError as
+    `read_samples`."""
     for key, files in groupby(read_files(path), lambda file: file[0].partition(".")[0]):
         yield key, {name.partition(".")[2]: data for name, data in files}
 
