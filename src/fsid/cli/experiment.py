@@ -60,7 +60,7 @@ def experiment(
     """
     from fsid.errors import FsidError
     from fsid.evaluate.experiments import experiment as run_experiment
-    from fsid.evaluate.experiments import photographs_known, scale_config
+    from fsid.evaluate.experiments import scale_config
 
     if kind == "ablation" and photos is not None:
         raise FsidError("--photos: only real-vs-synthetic trains on photographs")
@@ -81,9 +81,7 @@ def experiment(
     given |= {"tests": tuple(str(folder.resolve()) for folder in test)}
     config = replace(scale_config(kind, scale), **{k: v for k, v in given.items() if v is not None})
     console = Terminal(stderr=True, quiet=quiet, markup=False)
-    is_new = not (output / "experiment.yaml").exists()
-    if is_new and not quiet and (known := photographs_known(config, workers=workers)):
-        console.print(f"note: {known}", soft_wrap=True)
-    report = run_experiment(output, config, partial(progress_bar, quiet=quiet), workers=workers)
+    say = partial(console.print, soft_wrap=True)
+    report = run_experiment(output, config, partial(progress_bar, quiet=quiet), workers=workers, note=say)
     rows = json.loads((output / "results.json").read_text(encoding="utf-8"))
-    console.print(f"{report}: {len(rows)} rows", soft_wrap=True)
+    say(f"{report}: {len(rows)} rows")

@@ -21,7 +21,6 @@ from pathlib import Path
 from typing import Literal
 
 from fsid.config import Override, check_fields, given_keys, load_settings
-from fsid.counted import counted
 from fsid.dataset import (
     RENDERED,
     GenerateConfig,
@@ -48,11 +47,11 @@ from fsid.evaluate.compare import (
 )
 from fsid.evaluate.dead_leaves import write_dead_leaves
 from fsid.evaluate.experiment_report import write_experiment_report
-from fsid.evaluate.known import known_pictures
+from fsid.evaluate.known import known_note
 from fsid.evaluate.models import model_method
 from fsid.evaluate.simulated import LUXES, simulated_testset
 from fsid.evaluate.testbench import MATERIALS
-from fsid.evaluate.testset import ALL_SETS, as_text, levels_of, photo_testset, read_testset
+from fsid.evaluate.testset import ALL_SETS, levels_of, photo_testset, read_testset
 from fsid.files import make_folder, read_whole
 from fsid.scene import VARIANTS
 from fsid.sensor import load_bayer_profile
@@ -148,46 +147,40 @@ def scale_config(kind: Kind, scale: str) -> ExperimentConfig:
     raise FsidError(f"--scale {scale}: choose smoke, cpu or paper")
 
 
-def photographs_known(config: ExperimentConfig, *, workers: int = 1) -> str:
-    """In words, which test photographs the real rival is trained on, as copies; "" where none is found."""
-    if PHOTOGRAPHS not in SOURCES[config.kind]:
-        return ""
-    training = find_pictures(Path(config.photos))
-    said = []
-    for folder in config.tests:
-        tests = find_photos(folder)
-        if known := known_pictures(tests, training, max(min(workers, os.cpu_count() or 1), 1)):
-            test, theirs = (as_text(path.name) for path in known[0])
-            said.append(
-                f"{len(known)} of {counted(len(tests), 'test photograph')} of {as_text(_set_name(folder))} "
-                f"are trained on by the real rival, which flatters it ({test} is its {theirs})"
-            )
-    return "; ".join(said)
-
-
 @contextmanager
 def _silent(label: str, unit: str) -> Iterator[Callable[[int, int], None]]:
     yield lambda done, total: None
 
 
 def experiment(
-    out: str | Path, config: ExperimentConfig, bar: ProgressBar = _silent, *, workers: int = 1
+    out: str | Path,
+    config: ExperimentConfig,
+    bar: ProgressBar = _silent,
+    *,
+    workers: int = 1,
+    note: Callable[[str], None] = lambda line: None,
 ) -> Path:
     """Run it in `out`, or go on with it; returns the path of the report.
 
     Writes results.json (the rows of all test sets), images.csv and report.html. config: of `scale_config`, or
     one's own. bar(label, unit): for every stage a context manager that yields its progress(done, total).
     workers: processes that render; they import the calling script, so a script calls this under `if __name__
-    == "__main__":`.
+    == "__main__":`. note(line): called before the work where test photographs are copies of what the real
+    rival is trained on.
     """
     out = Path(out)
     _check(out, config, bar, workers)
     with claimed(out, config, "experiment"):
         _check_noise(out, config)
-        return _run(out, config, bar, workers)
+        return _run(out, config, bar, workers, note)
 
 
-def _run(out: Path, config: ExperimentConfig, bar: ProgressBar, workers: int) -> Path:
+def _run(
+    out: Path, config: ExperimentConfig, bar: ProgressBar, workers: int, note: Callable[[str], None]
+) -> Path:
+    known = _known(config, workers)
+    if known:
+        note(f"note: {known}")
     testsets = _testsets(out, config, bar)
     rows, images = _measured(out / "baselines", [NOISY, CLASSICAL], testsets, bar)
     for source in SOURCES[config.kind]:
@@ -206,7 +199,6 @@ def _run(out: Path, config: ExperimentConfig, bar: ProgressBar, workers: int) ->
     write_results(rows, out / "results.json")
     write_images(images, out / "images.csv")
     pairs = {source: _count(config, source) for source in SOURCES[config.kind]}
-    known = photographs_known(config, workers=workers)
     return write_experiment_report(out / "report.html", config, pairs, rows, images, known)
 
 
@@ -228,6 +220,15 @@ def _check(out: Path, config: ExperimentConfig, bar: ProgressBar, workers: int) 
     if pictures and not (out / "experiment.yaml").exists():
         with bar("checking photographs", "pictures") as progress:
             check_pictures(pictures, min(workers, os.cpu_count() or 1), progress)
+
+
+def _known(config: ExperimentConfig, workers: int) -> str:
+    """Which test photographs the real rival is trained on, for note and report."""
+    if PHOTOGRAPHS not in SOURCES[config.kind]:
+        return ""
+    tests = {_set_name(folder): find_photos(folder) for folder in config.tests}
+    threads = max(min(workers, os.cpu_count() or 1), 1)
+    return known_note(tests, find_pictures(Path(config.photos)), threads)
 
 
 def _check_noise(out: Path, config: ExperimentConfig) -> None:

@@ -8,19 +8,35 @@ the same collection beyond 0.3. Crops and mirrored copies are not found.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 
+from fsid.counted import counted
 from fsid.dataset.photos import thumbnail
 from fsid.errors import FsidError
+from fsid.evaluate.testset import as_text
 
 _SIDE = 16
 _ALIKE = 0.2
 _FLAT = 1 / 255
 """Deviation below which a picture has nothing to know it by."""
+
+
+def known_note(tests: Mapping[str, Sequence[Path]], training: Sequence[Path], threads: int) -> str:
+    """In words, which photographs of named test sets the rival is trained on; "" where none is found."""
+    seen = dict(known_pictures([path for photos in tests.values() for path in photos], training, threads))
+    said = []
+    for name, photos in tests.items():
+        if known := [path for path in photos if path in seen]:
+            test, theirs = (as_text(path.name) for path in (known[0], seen[known[0]]))
+            said.append(
+                f"{len(known)} of {counted(len(photos), 'test photograph')} of {as_text(name)} are trained "
+                f"on by the real rival, which flatters it ({test} is its {theirs})"
+            )
+    return "; ".join(said)
 
 
 def known_pictures(tests: Sequence[Path], training: Sequence[Path], threads: int) -> list[tuple[Path, Path]]:
