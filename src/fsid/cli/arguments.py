@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 Output = Annotated[Path, tyro.conf.arg(name="output", aliases=["-o"])]
 OptionalOutput = Annotated[Path | None, tyro.conf.arg(name="output", aliases=["-o"])]
+Ensemble = Literal[1, 2, 4, 8]
 
 
 def overrides(single: Iterable[str], **options: Any) -> list[Override]:

@@ -11,7 +11,7 @@ import numpy as np
 from rich.text import Text
 from tyro.conf import Positional
 
-from fsid.cli.arguments import black_levels
+from fsid.cli.arguments import Ensemble, black_levels
 from fsid.cli.iso_notes import note_extrapolation, note_files
 from fsid.cli.progress import progress_bar
 from fsid.errors import FsidError
@@ -30,6 +30,7 @@ def denoise(
     profile: str | None = None,
     iso: float | None = None,
     strength: float = 1.0,
+    ensemble: Ensemble = 1,
     backend: Literal["torch", "onnx"] | None = None,
     cfa: str | None = None,
     black_level: str | None = None,
@@ -55,6 +56,8 @@ def denoise(
         strength: 0 to 1: share of the noise's amplitude to remove (1 all of it, less leaves grain). Above 1:
             take the noise for that many times as strong, which smooths more, as far as the network keeps the
             colours (at most 100).
+        ensemble: Average over so many mirrored and transposed copies of the image, for as many times the time
+            (2 give half of what 8 do).
         backend: What runs the network: torch (on a GPU where there is one) or onnx (onnxruntime, on the CPU);
             by default onnx for an .onnx file, else torch.
         cfa: Colours of a bare mosaic's first 2x2 pixels, read row by row: RGGB, BGGR, GRBG or GBRG.
@@ -100,6 +103,7 @@ def denoise(
                     profile=profile,
                     iso=iso,
                     strength=strength,
+                    ensemble=ensemble,
                     layout=layout,
                     skip_existing=skip_existing,
                     progress=progress,
@@ -118,6 +122,7 @@ def denoise(
             profile=profile,
             iso=iso,
             strength=strength,
+            ensemble=ensemble,
             layout=layout,
             progress=progress,
         )

@@ -7,7 +7,7 @@ from pathlib import Path
 from rich.table import Column, Table
 from tyro.conf import Positional, UseAppendAction
 
-from fsid.cli.arguments import OptionalOutput
+from fsid.cli.arguments import Ensemble, OptionalOutput
 from fsid.cli.iso_notes import note_files
 from fsid.cli.progress import progress_bar
 from fsid.cli.tables import print_table
@@ -19,6 +19,7 @@ def evaluate(
     *,
     model: UseAppendAction[tuple[Path, ...]] = (),
     output: OptionalOutput = None,
+    ensemble: Ensemble = 1,
     quiet: bool = False,
 ) -> None:
     """Measure the noisy input, a classical denoiser and models: RAW PSNR, and PSNR and SSIM after develop.
@@ -31,6 +32,8 @@ def evaluate(
         model: Folder of a training, a model file, or the name of a shipped network (nafnet-small); may be
             given several times. Without it only the noisy input and the classical denoiser are measured.
         output: Folder of the results.
+        ensemble: Each model's results are the mean over so many mirrored and transposed copies of a capture,
+            as of fsid denoise; their names in the results say so.
         quiet: No progress bar.
     """
     from fsid.evaluate.models import evaluate_models, write_comparison
@@ -39,7 +42,7 @@ def evaluate(
     if output is not None:
         check_folder(output)
     with progress_bar("measuring", "captures", quiet=quiet) as progress:
-        comparison = evaluate_models(testset, model, progress=progress)
+        comparison = evaluate_models(testset, model, ensemble=ensemble, progress=progress)
     made = comparison.testset
     if made.camera in profile_names():  # that of a file is not there to be asked
         note_files(made.camera, made.captures(testset), quiet=quiet)

@@ -205,7 +205,7 @@ class PatchDataset(Dataset[Batch]):
             else:
                 capture, level = self._noisy[cell.mosaic.shard, cell.mosaic.key]
                 packed(self._around(cell, capture), capture, cut, noisy[slot])
-                level = _transposed(level) if is_transposed else level
+                level = level.transposed if is_transposed else level
                 k[slot], sigma2[slot] = level.k, level.sigma2
 
     def _around(self, cell: Cell, mosaic: StoredMosaic) -> np.ndarray:
@@ -269,14 +269,6 @@ def _exposed(
     normal = standard_normal(rng, clean.shape)
     noisy = with_noise(clean, normal, k[:, None, None], injected.clip(min=0)[:, None, None])
     return stored(noisy, camera.black_level, camera.span)
-
-
-def _transposed(level: NoiseLevel) -> NoiseLevel:
-    def swapped(values: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
-        r, gr, gb, b = values
-        return r, gb, gr, b
-
-    return NoiseLevel(swapped(level.k), swapped(level.sigma2))
 
 
 def _mosaics_of_split(

@@ -22,6 +22,7 @@ from typing import Protocol
 
 import numpy as np
 
+from fsid.denoise.ensemble import check_ensemble, self_ensemble
 from fsid.denoise.model import ModelCard
 from fsid.errors import FsidError
 from fsid.sensor.light import GREY
@@ -63,6 +64,7 @@ def denoise_raw(
     level: NoiseLevel | None = None,
     *,
     strength: float = 1.0,
+    ensemble: int = 1,
     tile_px: int = TILE_PX,
     progress: Progress | None = None,
 ) -> Raw:
@@ -70,27 +72,29 @@ def denoise_raw(
 
     level: noise of `raw`; None takes `raw.noise`. strength: 0..1 is the share of the noise's amplitude that
     is removed, so that grain is left below 1; above 1 the noise is taken to be that many times as strong, up
-    to a variance of `MAX_TOLD`, which smooths more. tile_px: side of a tile in packed pixels, overlap
+    to a variance of `MAX_TOLD`, which smooths more. ensemble: 1, 2, 4 or 8 mirrored and transposed copies
+    whose results are averaged, for as many times the time. tile_px: side of a tile in packed pixels, overlap
     excluded; memory grows with it, the result does not depend on it. progress(done, tiles) is called after
     each tile. Raises FsidError where `raw` is no `Raw`, the noise level unknown or not physical, the strength
-    below 0 or above `MAX_STRENGTH`, the mosaic holds NaN or infinity, or the network makes such.
+    below 0 or above `MAX_STRENGTH`, the ensemble another number, the mosaic holds NaN or infinity, or the
+    network makes such.
     """
     check_raw(raw)
+    check_ensemble(ensemble)
     level = level if level is not None else raw.noise
     _check(raw, level, strength, tile_px)
     assert level is not None
     if strength > 1:
         level = _stronger(level, strength**2)
-    row, column = site_offsets(raw.cfa)[0]
-    height, width = raw.mosaic.shape
-    stride = model.multiple
-    bottom, right = -(height + row) % (2 * stride), -(width + column) % (2 * stride)
-    aligned = np.pad(raw.mosaic, ((row, bottom), (column, right)), mode="reflect")
-    packed = pack(aligned.astype(np.float32, copy=False), "RGGB")
-    del aligned
-    clean = _denoise_packed(packed, model, level, tile_px, progress)
-    del packed
-    mosaic = np.ascontiguousarray(unpack(clean, "RGGB")[row : row + height, column : column + width])
+
+    def denoised(mosaic: np.ndarray, cfa: str, level: NoiseLevel, copy: int) -> np.ndarray:
+        def told(done: int, tiles: int) -> None:
+            if progress is not None:
+                progress(copy * tiles + done, ensemble * tiles)
+
+        return _denoise_mosaic(mosaic, cfa, model, level, tile_px, told)
+
+    mosaic = self_ensemble(raw.mosaic, raw.cfa, level, ensemble, denoised)
     if strength < 1:
         mosaic *= np.float32(strength)
         mosaic += np.float32(1 - strength) * raw.mosaic
@@ -142,8 +146,24 @@ def check_strength(level: NoiseLevel | None, strength: float) -> None:
         )
 
 
+def _denoise_mosaic(
+    mosaic: np.ndarray, cfa: str, model: Network, level: NoiseLevel, tile_px: int, progress: Progress
+) -> np.ndarray:
+    """mosaic (H, W) of any pattern, H and W even -> (H, W)."""
+    row, column = site_offsets(cfa)[0]
+    height, width = mosaic.shape
+    stride = model.multiple
+    bottom, right = -(height + row) % (2 * stride), -(width + column) % (2 * stride)
+    aligned = np.pad(mosaic, ((row, bottom), (column, right)), mode="reflect")
+    packed = pack(aligned.astype(np.float32, copy=False), "RGGB")
+    del aligned
+    clean = _denoise_packed(packed, model, level, tile_px, progress)
+    del packed
+    return np.ascontiguousarray(unpack(clean, "RGGB")[row : row + height, column : column + width])
+
+
 def _denoise_packed(
-    packed: np.ndarray, model: Network, level: NoiseLevel, tile_px: int, progress: Progress | None
+    packed: np.ndarray, model: Network, level: NoiseLevel, tile_px: int, progress: Progress
 ) -> np.ndarray:
     """packed (4, H, W), H and W multiples of the network's stride -> (4, H, W)."""
     stride, radius = model.multiple, model.receptive_radius
@@ -157,8 +177,7 @@ def _denoise_packed(
         if not np.all(np.isfinite(clean)):
             raise FsidError("the network makes NaN or infinity of this image: its weights are broken")
         out[:, row.kept, column.kept] = clean[:, row.inside, column.inside]
-        if progress is not None:
-            progress(done + 1, len(rows) * len(columns))
+        progress(done + 1, len(rows) * len(columns))
     return out
 
 

@@ -147,6 +147,7 @@ def denoise_file(
     profile: str | None = None,
     iso: float | None = None,
     strength: float = 1.0,
+    ensemble: int = 1,
     layout: Layout | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Noise:
@@ -171,7 +172,7 @@ def denoise_file(
     if iso is not None and not raw.iso > 0:
         raw = replace(raw, iso=iso)
     try:
-        clean = denoise_raw(raw, model, noise.level, strength=strength, progress=progress)
+        clean = denoise_raw(raw, model, noise.level, strength=strength, ensemble=ensemble, progress=progress)
     except FsidError as error:
         raise FsidError(f"{source}: {error}") from None
     write_dng(target, clean_levels(clean), preview_of(clean))
@@ -191,6 +192,7 @@ def denoise_folder(
     profile: str | None = None,
     iso: float | None = None,
     strength: float = 1.0,
+    ensemble: int = 1,
     layout: Layout | None = None,
     skip_existing: bool = False,
     progress: Callable[[int, int], None] | None = None,
@@ -220,7 +222,14 @@ def denoise_folder(
     for done, (source, out) in enumerate(zip(paths, targets, strict=True)):
         try:
             noises[source] = denoise_file(
-                source, out, model, profile=profile, iso=iso, strength=strength, layout=layout
+                source,
+                out,
+                model,
+                profile=profile,
+                iso=iso,
+                strength=strength,
+                ensemble=ensemble,
+                layout=layout,
             )
         except FsidError as error:
             failed(error)

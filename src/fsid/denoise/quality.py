@@ -47,7 +47,8 @@ def probes(photographs: Sequence[str] = MEASURED) -> list[Probe]:
     return found
 
 
-def mean_psnr(network: Network, measured: Sequence[Probe]) -> float:
-    """Mean over probes of the RAW PSNR in dB, data range 1."""
-    errors = [np.mean((denoise_raw(p.noisy, network).mosaic - p.clean) ** 2, dtype=float) for p in measured]
+def mean_psnr(network: Network, measured: Sequence[Probe], *, ensemble: int = 1) -> float:
+    """Mean over probes of the RAW PSNR in dB, data range 1. ensemble: as for `denoise_raw`."""
+    clean = (denoise_raw(probe.noisy, network, ensemble=ensemble).mosaic for probe in measured)
+    errors = [np.mean((c - p.clean) ** 2, dtype=float) for c, p in zip(clean, measured, strict=True)]
     return float(np.mean(-10 * np.log10(errors)))

@@ -13,12 +13,13 @@ from fsid.evaluate.testset import read_testset
 from fsid.files import make_folder
 
 
-def model_method(path: str | Path, name: str) -> Method:
-    """A trained model (as `load_model` takes it) as a method; its card says what it was trained on."""
+def model_method(path: str | Path, name: str, *, ensemble: int = 1) -> Method:
+    """A trained model (as `load_model` takes it) as a method; its card says what it was trained on. ensemble:
+    as for `denoise_raw`."""
     from fsid.denoise import denoise_raw, load_model
 
     model = load_model(path)
-    return Method(name, model.card.training, lambda raw: denoise_raw(raw, model))
+    return Method(name, model.card.training, lambda raw: denoise_raw(raw, model, ensemble=ensemble))
 
 
 def model_names(models: Sequence[str | Path]) -> list[str]:
@@ -47,12 +48,18 @@ def evaluate_models(
     testset: str | Path,
     models: Sequence[str | Path],
     *,
+    ensemble: int = 1,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Comparison:
-    """Compare the baselines and `models` (as `load_model` takes them), with crops of the middle level."""
+    """Compare the baselines and `models` (as `load_model` takes them), with crops of the middle level.
+
+    ensemble: of each model, as for `denoise_raw`; where it is not 1 their names say so.
+    """
     levels = read_testset(testset).levels
+    copies = "" if ensemble == 1 else f" (mean of {ensemble})"
     named = zip(models, model_names(models), strict=True)
-    methods = [NOISY, CLASSICAL, *(model_method(path, name) for path, name in named)]
+    trained = [model_method(path, f"{name}{copies}", ensemble=ensemble) for path, name in named]
+    methods = [NOISY, CLASSICAL, *trained]
     return compare(testset, methods, crop_levels=levels[len(levels) // 2 :][:1], progress=progress)
 
 

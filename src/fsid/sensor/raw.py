@@ -47,6 +47,12 @@ class NoiseLevel:
                 "k in DN by white - black, sigma2 in DN^2 by its square"
             )
 
+    @property
+    def transposed(self) -> NoiseLevel:
+        """That of a transposed mosaic: Gr, which shares its row with R, and Gb have changed places."""
+        (r, gr, gb, b), (r2, gr2, gb2, b2) = self.k, self.sigma2
+        return NoiseLevel((r, gb, gr, b), (r2, gb2, gr2, b2))
+
 
 @dataclass(frozen=True, eq=False)
 class Raw:
