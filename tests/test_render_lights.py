@@ -62,6 +62,24 @@ def test_the_sun_casts_parallel_shadows(renderer: Renderer) -> None:
     np.testing.assert_allclose(row[floor & (x > edge + pixel)], 0.5 / np.pi * 2.0 * 0.8, rtol=2e-3)
 
 
+def irradiance(light: Light, points: np.ndarray) -> np.ndarray:
+    """(H, W) what arrives at points (H, W, 3) that look up: the integral over the rectangle."""
+    direction = np.array(light.direction) / np.linalg.norm(light.direction)
+    width = np.cross(direction, (0.0, 0.0, 1.0))
+    width = np.array(ONE) * (1, 0, 0) if np.linalg.norm(width) < 1e-6 else width / np.linalg.norm(width)
+    height = np.cross(width, direction)
+    t = (np.arange(120) + 0.5) / 120 - 0.5
+    u, v = np.meshgrid(t * light.size_m[0], t * light.size_m[1])
+    spots = np.array(light.position_m) + u[..., None] * width + v[..., None] * height
+    total = np.zeros(points.shape[:2])
+    for spot in spots.reshape(-1, 3):
+        to = spot - points
+        r2 = (to**2).sum(-1)
+        cosines = np.maximum(to[..., 2], 0) * np.maximum(-(to @ direction), 0) / r2
+        total += cosines / r2
+    return total * light.colour[0] * light.size_m[0] * light.size_m[1] / t.size**2
+
+
 @pytest.mark.parametrize(
     "light",
     [
@@ -75,22 +93,20 @@ def test_an_area_light_is_an_integral(renderer: Renderer, light: Light) -> None:
     frame = draw(renderer, view(lambertian(grid(8.0)), lights=(light,), camera=SMALL))
     points = floor_points(SMALL)
     direction = np.array(light.direction) / np.linalg.norm(light.direction)
-    width = np.cross(direction, (0.0, 0.0, 1.0))
-    width = np.array(ONE) * (1, 0, 0) if np.linalg.norm(width) < 1e-6 else width / np.linalg.norm(width)
-    height = np.cross(width, direction)
-    t = (np.arange(120) + 0.5) / 120 - 0.5
-    u, v = np.meshgrid(t * light.size_m[0], t * light.size_m[1])
-    spots = np.array(light.position_m) + u[..., None] * width + v[..., None] * height
-    expected = np.zeros(points.shape[:2])
-    for spot in spots.reshape(-1, 3):
-        to = spot - points
-        r2 = (to**2).sum(-1)
-        cosines = np.maximum(to[..., 2], 0) * np.maximum(-(to @ direction), 0) / r2
-        expected += cosines / r2
-    expected *= 0.5 / np.pi * 2.0 * light.size_m[0] * light.size_m[1] / t.size**2
+    expected = 0.5 / np.pi * irradiance(light, points)
     inner = np.abs((points - light.position_m) @ direction) > 0.05
     inner &= expected > 0.02 * expected[inner].max()
     np.testing.assert_allclose(frame.radiance[inner, 0], expected[inner], rtol=0.01)
+
+
+def test_the_part_of_an_area_light_above_a_face_lights_it(renderer: Renderer) -> None:
+    """Its middle is 0.2 m below the top of a block, its upper edge 0.3 m above."""
+    light = panel((1.2, 0.2, 0.1), (-1.0, 0.0, 0.0), (1.0, 1.0))
+    frame = draw(renderer, view(lambertian(block((0.8, 0.8, 0.3))), lights=(light,), camera=SMALL))
+    points = floor_points(SMALL) * (1.7 / 2.0) + (0.0, 0.0, 0.3)
+    top = np.abs(points[..., :2]).max(-1) < 0.37
+    expected = 0.5 / np.pi * irradiance(light, points)[top]
+    np.testing.assert_allclose(frame.radiance[top, 0], expected, rtol=0.02)
 
 
 def test_an_area_light_casts_a_soft_shadow(renderer: Renderer) -> None:

@@ -110,13 +110,22 @@ bool alone(Receiver r, Field f, float width) {
     return abs(f.moments.x - f.limit) < 0.3 * r.bias && variance < own + r.bias * r.bias;
 }
 
+// Whence the middle of an area light is asked for, relative to it. Where it is behind a face, or hardly before it, but
+// a part of the light is not, all that the map shows in front is the body that the face is of: so from above the face,
+// whose plane the way to the middle then crosses halfway, beyond most bodies.
+vec3 raised(Light light, vec3 d, vec3 n) {
+    float low = dot(n, d) + length(d) / STEEPEST;
+    float part = abs(dot(n, light.half_width)) + abs(dot(n, light.half_height));
+    return light.kind == AREA && low > 0.0 && dot(n, d) < part ? d + low * n : d;
+}
+
 // Share of the light seen from `position`: soft shadows by the mean depth of what is in the way
 // (Fernando 2005), with fixed taps that are areas and not points, so that they leave no pattern; where the
 // penumbra is a few texels, a percentage-closer filter on the depth itself. Where all that the penumbra can
 // reach is of one kind, nothing is filtered. wanted: false asks nothing.
 // even: whether the result is as smooth as the receiver within around_m metres.
 float visibility(Light light, vec3 position, vec3 face_normal, bool wanted, float around_m, out bool even) {
-    Receiver r = receiver_of(light, position - light.position, face_normal);
+    Receiver r = receiver_of(light, raised(light, position - light.position, face_normal), face_normal);
     float shaded = 0.0, blocked_sum = 0.0, blocked, farthest = 1.2 * r.search;
     Field all = field_at(r, vec2(0), farthest);
     bool asked = wanted && r.inside, closed = asked && soft_lit(r, all, blocked) < 1.0 - DARK;
