@@ -125,6 +125,34 @@ def test_an_area_light_casts_a_soft_shadow(renderer: Renderer) -> None:
     assert share[floor & (x > 0.32)].min() > 0.99
 
 
+@pytest.mark.parametrize("layer", ["metal"])
+def test_the_highlight_of_an_area_light_is_that_of_its_pieces(renderer: Renderer, layer: str) -> None:
+    """Within a sixth of 64 small lights, also opposite a low viewer, where Fresnel's share changes most."""
+    material = plain(ONE if layer == "metal" else (0.0, 0.0, 0.0), roughness=50, family=layer)
+    if layer == "coat":
+        material = replace(plain((0.0, 0.0, 0.0)), clearcoat=1.0, clearcoat_roughness=0.5)
+    sheet = Drawable(grid(8.0), STILL, (material,), 0, specular=0.04 * (layer == "body"), casts=False)
+    light = panel((-1.9, 0.0, 0.7), (1.0, 0.0, -0.37), (0.8, 0.8), 1.0)
+    ahead = np.array(light.direction) / np.linalg.norm(light.direction)
+    up = np.cross((0.0, -1.0, 0.0), ahead)
+    t = ((np.arange(8) + 0.5) / 8 - 0.5) * 0.8
+    places = np.array(light.position_m) + t[:, None, None] * (0.0, 1.0, 0.0) + t[:, None] * up
+    pieces = tuple(
+        Light("spot", tuple(place), tuple(-place), (share,) * 3, 0.0, 40.0)
+        for place in places.reshape(-1, 3)
+        for share in [0.01 * float(-place @ ahead / np.linalg.norm(place))]
+    )
+    far = (1e4, 1e4, 1e4)  # nothing of these lights comes back from there
+    for elevation in np.radians([60.0, 30.0, 15.0]):
+        place = (3 * float(np.cos(elevation)), 0.0, 3 * float(np.sin(elevation)))
+        camera = Camera(place, (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 0.5, 4, 4)
+        views = (view(sheet, lights=lights, camera=camera) for lights in ((), (light,), pieces))
+        dark, shown, summed = (
+            draw(renderer, replace(what, room_size_m=far)).radiance[2, 2, 1] for what in views
+        )
+        np.testing.assert_allclose(shown - dark, summed - dark, rtol=1 / 6)
+
+
 def test_an_area_light_is_seen_and_mirrored(renderer: Renderer) -> None:
     """Its face has its own radiance; a mirror floor under it shows nearly that, and never more."""
     light = panel((0.0, 0.0, 0.25), (0.0, 0.0, -1.0), (1.0, 1.0), 3.0)

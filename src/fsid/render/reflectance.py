@@ -32,7 +32,7 @@ def reflectance_table() -> np.ndarray:
     centres = (np.arange(SIZE) + 0.5) / SIZE
     table = np.empty((SIZE, SIZE, 3), np.float32)
     for row, roughness in zip(table, centres, strict=True):
-        _, vh, weight = _half_vectors(roughness, centres[:, None])
+        vh, weight = _half_vectors(roughness, centres[:, None])
         fresnel = (1 - vh) ** 5
         row[:, 0] = ((1 - fresnel) * weight).mean(1)
         row[:, 1] = (fresnel * weight).mean(1)
@@ -47,16 +47,8 @@ def clear_fresnel(cosine: np.ndarray) -> np.ndarray:
     return np.asarray(0.5 * across**2 * (1 + tilt**2))
 
 
-def reflected_directions(roughness: float, nv: float) -> tuple[np.ndarray, np.ndarray]:
-    """(N, 3) unit directions that light comes from, x along the viewer's projection, z the normal; (N,) what
-    comes from each, without Fresnel."""
-    half, vh, weight = _half_vectors(roughness, np.array(nv))
-    v = np.array([np.sqrt(1 - nv * nv), 0.0, nv])
-    return (2 * vh[:, None] * half - v)[weight > 0], weight[weight > 0]
-
-
-def _half_vectors(roughness: float, nv: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(N, 3) half vectors of GGX; for nv (..., 1) their cosines to the viewer, and what each reflects."""
+def _half_vectors(roughness: float, nv: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """For nv (..., 1) the cosines of N half vectors of GGX to the viewer, and what each reflects."""
     i = np.arange(_POINTS)
     u = (i + 0.5) / _POINTS
     phi = 2 * np.pi * _radical_inverse(i)
@@ -68,8 +60,7 @@ def _half_vectors(roughness: float, nv: np.ndarray) -> tuple[np.ndarray, np.ndar
     lit = nl > 0
     nl = np.maximum(nl, 1e-6)
     masking = nl * np.sqrt(nv * nv * (1 - a2) + a2) + nv * np.sqrt(nl * nl * (1 - a2) + a2)
-    half = np.stack([sine * np.cos(phi), sine * np.sin(phi), nh], axis=-1)
-    return half, vh, np.where(lit, 2 * nl * vh / (masking * nh), 0.0)
+    return vh, np.where(lit, 2 * nl * vh / (masking * nh), 0.0)
 
 
 def _radical_inverse(i: np.ndarray) -> np.ndarray:
