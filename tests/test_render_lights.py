@@ -125,7 +125,7 @@ def test_an_area_light_casts_a_soft_shadow(renderer: Renderer) -> None:
     assert share[floor & (x > 0.32)].min() > 0.99
 
 
-@pytest.mark.parametrize("layer", ["metal"])
+@pytest.mark.parametrize("layer", ["body", "coat", "metal"])
 def test_the_highlight_of_an_area_light_is_that_of_its_pieces(renderer: Renderer, layer: str) -> None:
     """Within a sixth of 64 small lights, also opposite a low viewer, where Fresnel's share changes most."""
     material = plain(ONE if layer == "metal" else (0.0, 0.0, 0.0), roughness=50, family=layer)

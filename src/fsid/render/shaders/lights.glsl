@@ -43,12 +43,13 @@ float arc(float cosine) {
 }
 
 // Integral of cos(theta) / pi around z over a rectangle above the horizon (Lambert 1760, as summed over edges by
-// Baum et al. 1989), seen from `position`, its directions bent by `bend`. wanted: false gives 0, soon.
-float form_factor(Light light, vec3 position, mat3 bend, bool wanted) {
+// Baum et al. 1989), seen from `position`, its directions bent by `bend`. wanted: false gives 0, soon. middle: the sum
+// of these directions, as long as it comes.
+float form_factor(Light light, vec3 position, mat3 bend, bool wanted, out vec3 middle) {
     vec3 centre = bend * (light.position - position);
     vec3 w = bend * light.half_width, h = bend * light.half_height;
     vec3 leaves = vec3(0), returns = vec3(0), a = centre - w - h;
-    float sum = 0.0;
+    middle = vec3(0);
     bool cut = false;
     int i = wanted ? 0 : 4;
     do {
@@ -66,10 +67,16 @@ float form_factor(Light light, vec3 position, mat3 bend, bool wanted) {
         float ratio = arc(min(abs(cosine), 1.0));
         ratio = cosine < 0.0 ? PI * inversesqrt(max(dot(across, across), 1e-14)) - ratio : ratio;
         bool counts = side ? max(a.z, b.z) > 0.0 : cut;
-        sum += counts ? across.z * ratio : 0.0;
+        middle += counts ? across * ratio : vec3(0);
         a = b;
     } while (++i < 4 || i == 4 && cut);
-    return abs(sum) * (0.5 / PI);
+    middle *= middle.z < 0.0 ? -1.0 : 1.0;
+    return middle.z * (0.5 / PI);
+}
+
+float form_factor(Light light, vec3 position, mat3 bend, bool wanted) {
+    vec3 middle;
+    return form_factor(light, position, bend, wanted, middle);
 }
 
 // Leaves directions as they are, n being z.

@@ -21,13 +21,27 @@ vec3 reflected(vec3 f0, float alpha, vec3 n, vec3 v, vec3 l) {
     return (f0 + (1.0 - f0) * (s2 * s2 * s)) * share;
 }
 
+#if AREAS
+// Cosine at the microfacets that mirror the middle of an area light, as `form_factor` has it. Within a lobe Fresnel's
+// share may grow tenfold: that of these is taken, and the more of the lobe is light, the more that of all of it.
+float facets_at(mat3 bend, vec3 middle, vec3 v) {
+    vec3 l = inverse(bend) * middle;
+    return clamp(dot(v, normalize(v + l * inversesqrt(max(dot(l, l), 1e-30)))), 0.0, 1.0);
+}
+#endif
+
 #if LOBES
-// f * cos of a clear coat, with Fresnel's equations: at 45 to 65 degrees Schlick's misses 15 to 23 % of index 1.5.
-float coat_reflected(float alpha, vec3 n, vec3 v, vec3 l) {
-    float c, share = microfacets(alpha, n, v, l, c);
+// Fresnel's equations at cosine c: at 45 to 65 degrees Schlick's misses 15 to 23 % of index 1.5.
+float clear_fresnel(float c) {
     float g = sqrt(COAT_INDEX * COAT_INDEX - 1.0 + c * c);
     float across = (g - c) / (g + c), tilt = (c * (g + c) - 1.0) / (c * (g - c) + 1.0);
-    return 0.5 * across * across * (1.0 + tilt * tilt) * share;
+    return 0.5 * across * across * (1.0 + tilt * tilt);
+}
+
+// f * cos of a clear coat.
+float coat_reflected(float alpha, vec3 n, vec3 v, vec3 l) {
+    float c, share = microfacets(alpha, n, v, l, c);
+    return clear_fresnel(c) * share;
 }
 
 // Cloth's fuzz of roughness 0.5 (Estevez and Kulla 2017) with the visibility of Neubelt and Pettineo (2013); f * cos.
@@ -53,6 +67,7 @@ struct Reflector {
     vec3 mirror;          // share of even surroundings that the GGX lobe reflects
 #if AREAS
     mat3 facing, lobe;    // bend directions so that the body's and the mirror's share of light is a cosine around z
+    float whole, edge;    // of the mirror: share of even surroundings without Fresnel; reflectance at grazing angles
 #endif
 #if LOBES
     // The layers above take their share of what arrives at those below.
@@ -60,6 +75,7 @@ struct Reflector {
     vec3 through;         // diffuse light that leaves on the other side
 #if AREAS
     mat3 coat_lobe;
+    float coat_whole;
 #endif
 #endif
 };
@@ -83,7 +99,8 @@ Reflector reflector_of(Sample p, Surface s, Matter m, float spread) {
     b.sheen = s.sheen;
     b.cloth = s.sheen * fuzz_share(nv);
     b.coated = s.clearcoat * (1.0 - b.cloth);
-    float coat = s.clearcoat * reflectance_at(sqrt(b.coat_alpha), nv, 0.0).z;
+    vec4 coat_share = reflectance_at(sqrt(b.coat_alpha), nv, 0.0);
+    float coat = s.clearcoat * coat_share.z;
     b.below = (1.0 - coat) * (1.0 - b.cloth);
     b.coat = coat * (1.0 - b.cloth);
     b.through = b.diffuse * s.translucency * b.below;
@@ -91,12 +108,16 @@ Reflector reflector_of(Sample p, Surface s, Matter m, float spread) {
 #endif
     b.f0 = mix(vec3(s.specular), m.albedo, m.metallic);
     b.rebound = 1.0 + b.f0 * (1.0 / max(share.x + share.y, 0.1) - 1.0);
-    b.mirror = b.rebound * (b.f0 * share.x + min(share.y, 50.0 * max(b.f0.r, max(b.f0.g, b.f0.b))));
+    float most = 50.0 * max(b.f0.r, max(b.f0.g, b.f0.b));
+    b.mirror = b.rebound * (b.f0 * share.x + min(share.y, most));
 #if AREAS
     b.facing = upright(b.n);
+    b.whole = share.x + share.y;
+    b.edge = min(most, 1.0);
     b.lobe = lobe_of(sqrt(b.alpha), b.n, b.v);
 #if LOBES
     b.coat_lobe = lobe_of(sqrt(b.coat_alpha), b.n, b.v);
+    b.coat_whole = b.coated * (coat_share.x + coat_share.y);
 #endif
 #endif
     return b;
@@ -121,12 +142,16 @@ vec3 returned(Light light, Sample p, Reflector b) {
 #if AREAS
     bool area = light.kind == AREA, seen = area && dot(to_light, light.direction) < 0.0;
     float front = form_factor(light, p.position, b.facing, seen);
-    float glossy = form_factor(light, p.position, b.lobe, seen);
-    vec3 from_area = b.diffuse * front + b.mirror * glossy;
+    vec3 middle;
+    float glossy = form_factor(light, p.position, b.lobe, seen, middle);
+    float slant = 1.0 - facets_at(b.lobe, middle, b.v), slant2 = slant * slant;
+    vec3 there = b.rebound * b.whole * mix(b.f0, vec3(b.edge), slant2 * slant2 * slant);
+    vec3 from_area = b.diffuse * front + mix(there, b.mirror, glossy) * glossy;
 #if LOBES
     bool passes = max(b.through.r, max(b.through.g, b.through.b)) > 0.0;
-    from_area = from_area * b.below + b.cloth * front
-        + b.coat * form_factor(light, p.position, b.coat_lobe, seen && b.coat > 0.0)
+    float in_coat = form_factor(light, p.position, b.coat_lobe, seen && b.coat > 0.0, middle);
+    float coat_there = b.coat_whole * clear_fresnel(facets_at(b.coat_lobe, middle, b.v));
+    from_area = from_area * b.below + b.cloth * front + mix(coat_there, b.coat, in_coat) * in_coat
         + b.through * form_factor(light, p.position, flipped(b.facing), seen && passes);
 #endif
     result = area ? seen ? light.colour * from_area : vec3(0) : result;
