@@ -643,6 +643,24 @@ def test_a_background_without_a_material_is_named() -> None:
         )
 
 
+@pytest.mark.parametrize("cloudiness", [0.0, 0.7])
+def test_a_matt_surface_has_the_light_of_all_the_sky_above_it(renderer: Renderer, cloudiness: float) -> None:
+    """L = albedo / pi * integral of the sky's radiance times cos(theta), however the surface is tilted."""
+    sky = Sky("procedural", (0.3, 0.4, 0.7), seed=5, cloudiness=cloudiness)
+    what = replace(view(lambertian(sphere(0.3))), sky=sky)
+    frame = draw(renderer, what)
+    on = (frame.object_id == 0) & (frame.normal[..., 2] > 0.15)  # without the outline
+    normals = frame.normal[on].astype(float)  # from above, camera space is the world's
+    picture = panorama(sky)[::4, ::4]
+    elevation, azimuth = angles(len(picture))
+    up, around = np.meshgrid(elevation, azimuth, indexing="ij")
+    towards = np.stack([np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)], -1)
+    power = picture * (np.cos(up) * (np.pi / len(picture)) ** 2)[..., None]
+    cosines = np.maximum(normals[::7] @ towards.reshape(-1, 3).T, 0.0)
+    error = frame.radiance[on][::7] / (0.5 / np.pi * cosines @ power.reshape(-1, 3)) - 1
+    assert np.abs(error).mean() < 0.03
+
+
 @pytest.mark.parametrize(("rows", "turn"), [(512, 0), (512, 7), (512, 200), (333, 1), (1500, 750)])
 def test_the_sun_in_a_picture_of_the_sky_gives_all_its_light(rows: int, turn: int) -> None:
     """One texel of irradiance 3 wherever it lies: E max(cos, 0) / pi towards each axis, besides the grey."""

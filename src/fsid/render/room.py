@@ -9,7 +9,12 @@ has the colour of `Scene.ambient` times that of each side (one bounce), normalis
 six sides has the luminance of `Scene.ambient`: a closed white room gives exactly `ambient` from everywhere.
 
 Out of doors the sides are the sky, so far away that places do not matter, and the ambient light is
-irradiance / pi towards each axis.
+irradiance E / pi towards each axis. On a surface of normal n it is
+
+    E(n) = sum over axes a of  n_a^2 (E(a) + E(-a)) / 2 + n_a (E(a) - E(-a)) / 2,
+
+which is all of E but for products of two axes and what lies beyond the second order of spherical harmonics, a
+hundredth of it (Ramamoorthi and Hanrahan 2001).
 """
 
 from __future__ import annotations

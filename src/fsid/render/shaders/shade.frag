@@ -137,11 +137,11 @@ vec3 radiance(Sample p, Surface s, Matter m, float spread, inout bool missing) {
         in_coat = coat ? shown : in_coat;
         coat = !coat;
     } while (coat && b.coat > 0.0);
-    vec3 even = cube(ambient_sides, b.n);
+    vec3 even = ambient_on(b.n);
     vec3 surroundings = (even * b.diffuse + b.mirror * in_body) * b.below + b.coat * in_coat
-                      + b.cloth * even + b.through * cube(ambient_sides, -b.n);
+                      + b.cloth * even + b.through * ambient_on(-b.n);
 #else
-    vec3 surroundings = cube(ambient_sides, b.n) * b.diffuse + b.mirror * surroundings_in(p, b.r, b.alpha);
+    vec3 surroundings = ambient_on(b.n) * b.diffuse + b.mirror * surroundings_in(p, b.r, b.alpha);
 #endif
     vec3 result = light + openness(blocks, p.depth) * surroundings;
 #if GLASS
