@@ -56,8 +56,8 @@ def denoise(
         strength: 0 to 1: share of the noise's amplitude to remove (1 all of it, less leaves grain). Above 1:
             take the noise for that many times as strong, which smooths more, as far as the network keeps the
             colours (at most 100).
-        ensemble: Average over so many mirrored and transposed copies of the image, for as many times the time
-            (2 give half of what 8 do).
+        ensemble: Average over so many mirrored and transposed copies of the image: less error (0.1 dB with 8,
+            two thirds of that with 2) for as many times the time.
         backend: What runs the network: torch (on a GPU where there is one) or onnx (onnxruntime, on the CPU);
             by default onnx for an .onnx file, else torch.
         cfa: Colours of a bare mosaic's first 2x2 pixels, read row by row: RGGB, BGGR, GRBG or GBRG.
