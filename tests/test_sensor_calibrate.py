@@ -8,8 +8,10 @@ from PIL import Image
 
 from fsid.errors import FsidError
 from fsid.sensor import (
+    NoiseTerms,
     Raw,
     TemporalStatistics,
+    add_noise_terms,
     fit_noise,
     load_profile,
     noisy_from_clean,
@@ -73,6 +75,24 @@ def test_dark_frames_give_black_and_read_noise():
     sigma2_dn = np.array(PROFILE.level(3200).sigma2) * PROFILE.span**2
     np.testing.assert_allclose(fit.black, 64, atol=0.05)
     np.testing.assert_allclose(fit.sigma2_dn, sigma2_dn, rtol=0.03)
+
+
+@pytest.mark.parametrize("terms", [NoiseTerms(), NoiseTerms(row=0.3), NoiseTerms(column=0.3)])
+def test_stated_errors_of_sigma2_are_its_scatter_with_banding_too(terms):
+    """The pixels of a row that share its noise are fewer samples than there are pixels."""
+    level, scene = PROFILE.level(3200), _gradient(128)
+    black = Raw(np.zeros((128, 128), np.float32), PROFILE.cfa, 64, 1023, (1, 1, 1), np.eye(3))
+    lit = _burst(scene, 3200, 12, np.random.default_rng(0))
+    found, stated = [], []
+    for seed in range(24):
+        rng, dark = np.random.default_rng(seed), TemporalStatistics(white_level=1023)
+        for _ in range(12):
+            dark.add(to_dn(add_noise_terms(rng, black, level, terms)))
+        fit = fit_noise([lit], cfa=PROFILE.cfa, white_level=1023, dark=dark)
+        found.append(fit.sigma2_dn)
+        stated.append(fit.sigma2_dn_error)
+    scatter = np.var(found, axis=0, ddof=1).mean()
+    assert 0.8 < np.sqrt(np.mean(np.square(stated)) / scatter) < 1.3
 
 
 def test_hot_pixels_do_not_lift_the_black_level():

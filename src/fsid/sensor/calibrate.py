@@ -5,7 +5,9 @@
 Every pixel is its own experiment: its variance over the frames knows nothing of texture, vignetting or fixed
 pattern. Pixels of like mean are pooled, and each pool weighs as much as its variance is certain: the variance
 of the mean of N sample variances from n frames is 2 V^2 / (N (n - 1)). Unweighted, the bright pools drown the
-intercept. Dark frames give black level and intercept directly; without them the black level must be known.
+intercept. Dark pixels with noise of their row or column in common are fewer independent samples than N: that
+widens the stated errors by as much as the lines are seen to scatter, and leaves the weights alone. Dark
+frames give black level and intercept directly; without them the black level must be known.
 
 Excluded: pixels that hardly ever left 0 or white, means above 70 % of the range (EMVA 1288, 6.6), pixels
 whose variance no Gaussian noise explains (telegraph noise, something moved), and those of dark frames that
@@ -57,12 +59,14 @@ class Samples:
 
     signal, variance: (m,) DN above black and DN^2. freedom: (m,) degrees of freedom. used: (m,) bool, False
     where the fit leaves the pool out (beyond the linear range, or too little left by the converter).
+    banding: (m,) DN^4, squared error of the variance beyond that of independent pixels.
     """
 
     signal: np.ndarray
     variance: np.ndarray
     freedom: np.ndarray
     used: np.ndarray
+    banding: np.ndarray
 
     def in_use(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """signal, variance and freedom of the pools that the fit takes."""
@@ -72,7 +76,7 @@ class Samples:
     @staticmethod
     def joined(parts: Sequence[Samples]) -> Samples:
         """All pools of several bursts or sites."""
-        names = ("signal", "variance", "freedom", "used")
+        names = ("signal", "variance", "freedom", "used", "banding")
         return Samples(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
@@ -126,20 +130,24 @@ def pool_dark(
 
     black: DN of each site, where it is known from shorter dark frames; else the level is the black level.
     """
-    sites = dark.sites(cfa, defective(dark.mean()))
+    far, largest = defective(dark.mean()), _largest(dark.frames)
+    sites = dark.sites(cfa, far)
     if min(mean.size for mean, _ in sites) < _MIN_POOL_PIXELS:
         raise FsidError("the dark frames are clipped everywhere; check that the lens was covered")
     found = []
     for mean, variance in sites:
-        sound = variance <= _largest(dark.frames) * max(float(np.median(variance)), RESOLVED_DN2)
+        sound = variance <= largest * max(float(np.median(variance)), RESOLVED_DN2)
         found.append(dark_noise(mean[sound], variance[sound], dark.frames, white_level))
     levels = np.array([site.level for site in found])
     signals = levels - (levels if black is None else black)
     samples = []
-    for site, signal in zip(found, signals, strict=True):
+    factors = dark.banding_factors(cfa, far, largest)
+    for site, signal, factor in zip(found, signals, factors, strict=True):
         known = np.isfinite(site.variance_error)
         freedom = 2 * (site.variance / max(site.variance_error, 1e-9)) ** 2 if known else 0.0
-        samples.append(Samples(*(np.array([v]) for v in (signal, site.variance, freedom, known))))
+        banding = (factor - 1) * site.variance_error**2 if known else 0.0
+        values = (signal, site.variance, freedom, known, banding)
+        samples.append(Samples(*(np.array([v]) for v in values)))
     return tuple(samples), levels
 
 
@@ -200,7 +208,7 @@ def _pool(mean: np.ndarray, variance: np.ndarray, frames: int, black: float, whi
     order = np.argsort(mean)
     signal, variance = mean[order] - black, variance[order]
     if signal.size < _MIN_POOL_PIXELS:
-        return Samples(np.empty(0), np.empty(0), np.empty(0), np.empty(0, bool))
+        return Samples(np.empty(0), np.empty(0), np.empty(0), np.empty(0, bool), np.empty(0))
     starts = _starts(signal, variance, frames, white - black)
     sound = _sound(signal, variance, starts, frames, LINEAR_SHARE * (white - black))
     count = np.add.reduceat(sound, starts, dtype=np.int64)
@@ -214,7 +222,7 @@ def _pool(mean: np.ndarray, variance: np.ndarray, frames: int, black: float, whi
     restored = np.where(resolved, tau2 + ROUNDING_DN2, stored)
     rarity = np.minimum(1, 2 * stored / np.maximum(1 - stored, stored))  # Gaussian against rare steps of 1 DN
     freedom = count[full] * (frames - 1.0) * rarity * (restored / (slope * np.maximum(stored, 1e-9))) ** 2
-    return Samples(level - black, restored, freedom, used)
+    return Samples(level - black, restored, freedom, used, np.zeros(len(level)))
 
 
 def _fractions(level: np.ndarray, sound: np.ndarray, starts: np.ndarray) -> np.ndarray:
@@ -287,8 +295,16 @@ def _line(samples: Samples) -> tuple[float, float, float, float]:
             sigma2 = ROUNDING_DN2
             k = float((weight * signal * (variance - sigma2)).sum() / (weight * signal**2).sum())
         model = k * signal + sigma2
-    k_error, sigma2_error = error * np.sqrt(max(_scatter(variance - model, weight), 1.0))
+    error2 = error**2 * max(_scatter(variance - model, weight), 1.0)
+    k_error, sigma2_error = np.sqrt(error2 + _by_banding(signal, weight, samples.banding[samples.used]))
     return k, sigma2, float(k_error), float(sigma2_error)
+
+
+def _by_banding(signal: np.ndarray, weight: np.ndarray, banding: np.ndarray) -> np.ndarray:
+    """(2,) squared errors of slope and intercept by those of the pools, `banding` in DN^4."""
+    design = np.stack([signal, np.ones_like(signal)], axis=1)
+    weighted = design.T * weight
+    return np.linalg.solve(weighted @ design, weighted) ** 2 @ banding
 
 
 def _scatter(residual: np.ndarray, weight: np.ndarray) -> float:

@@ -35,6 +35,7 @@ CONTAMINATION = 0.1  # of a pixel's noise variance, from which on a changed bloc
 STUCK = 0.9  # of the frames at 0 or white; what noise carries there less often still tells its variance
 LARGEST_CORRELATION = 0.1  # between the changes of neighbours; noise has none
 _THINNING = 4
+_LEAST_LINES = 8  # that tell how much their means scatter
 _LEAST_WHITE_TEST_PX = 64
 
 
@@ -115,17 +116,33 @@ class TemporalStatistics:
 
         left_out: (H, W) bool, pixels that shall not count.
         """
-        mean, usable = self.mean(), ~self._unusable()
-        if left_out is not None:
-            usable &= ~left_out
+        mean, usable = self.mean(), self._usable(left_out)
         freedom = (self.frames - 1) * self._counted_noise()
-        places = [np.s_[:, :]] if cfa is None else [np.s_[r::2, c::2] for r, c in site_offsets(cfa)]
         found = []
-        for place in places:
+        for place in _places(cfa):
             keep = usable[place]
             total, squares = self._sum[place][keep], self._squares[place][keep]
             found.append((mean[place][keep], (squares - total**2 / self.frames) / freedom))
         return found
+
+    def banding_factors(self, cfa: str | None, left_out: np.ndarray, largest: float) -> list[float]:
+        """The squared error of each site's mean variance, 1 where its pixels are independent samples.
+
+        Those of a row or column with noise in common are not: the mean variances of neighbouring lines then
+        differ by more than those of their pixels explain. largest: variance in medians that counts.
+        """
+        usable = self._usable(left_out)
+        found = []
+        for place in _places(cfa):
+            variance = self._squares[place] - self._sum[place] ** 2 / self.frames
+            keep = usable[place] & (variance <= largest * np.median(variance[usable[place]]))
+            of_pixels = float(variance[keep].var())
+            lines = (_excess(variance, keep), _excess(variance.T, keep.T)) if of_pixels else (0.0, 0.0)
+            found.append(1 + sum(max(line / max(of_pixels, 1e-9), 0.0) for line in lines))
+        return found
+
+    def _usable(self, left_out: np.ndarray | None) -> np.ndarray:
+        return ~self._unusable() if left_out is None else ~self._unusable() & ~left_out
 
     def _counted_noise(self) -> float:
         """How often the sum of squared changes holds the noise of each frame but one; 1 in steady light.
@@ -245,6 +262,23 @@ class TemporalStatistics:
         for power in self._powers:
             power += squares
             squares *= squares
+
+
+def _places(cfa: str | None) -> list[tuple[slice, slice]]:
+    return [np.s_[:, :]] if cfa is None else [np.s_[r::2, c::2] for r, c in site_offsets(cfa)]
+
+
+def _excess(values: np.ndarray, keep: np.ndarray) -> float:
+    """Pixels per row times the variance of row means, less what independent pixels would give of it.
+
+    From differences between neighbouring rows, since shading is smooth.
+    """
+    count = keep.sum(axis=1)
+    full = count > count.max() / 2
+    if full.sum() < _LEAST_LINES:
+        return 0.0
+    means = np.where(keep, values, 0.0).sum(axis=1)[full] / count[full]
+    return float(count[full].mean() * (np.diff(means) ** 2).mean() / 2 - values[keep].var())
 
 
 def _check_dn(dn: np.ndarray, name: str) -> None:
