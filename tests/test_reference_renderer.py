@@ -258,9 +258,10 @@ def glossy_floor(light: Light, family: str, roughness: float, grey: float = 0.5,
 
 @pytest.mark.parametrize(("family", "roughness"), [("paint", 0.3), ("paint", 0.8), ("anodised_metal", 0.3)])
 def test_an_area_light_shines_as_in_the_path_tracer(family: str, roughness: float):
-    """Diffuse and glossy light of a rectangle within 5 % in the median, also where it is brightest.
+    """Diffuse and glossy light of a rectangle within 7 % in the median, also where it is brightest.
 
-    Rough metals are left out: the rasteriser gives back what one bounce between microfacets loses.
+    2 to 3 % of what paint lacks is Schlick's approximation (docs/results/renderer.md). Rough metals are left
+    out: the rasteriser gives back what one bounce between microfacets loses.
     """
     light = Light("area", (0.0, 0.9, 0.8), (0.0, -0.8, -0.6), (6.0, 6.0, 6.0), 0.0, 360.0, (0.8, 0.5))
     scene = glossy_floor(light, family, roughness)
@@ -270,7 +271,7 @@ def test_an_area_light_shines_as_in_the_path_tracer(family: str, roughness: floa
     shown = (drawn.albedo.mean(-1) > 0.2) & (drawn.depth < 4)
     a, b = drawn.radiance[shown].mean(-1), traced.radiance[shown].mean(-1)
     bright = b > np.quantile(b, 0.8)
-    assert np.median(a[b > 0.02 * b.max()] / b[b > 0.02 * b.max()]) == pytest.approx(1.0, abs=0.05)
+    assert np.median(a[b > 0.02 * b.max()] / b[b > 0.02 * b.max()]) == pytest.approx(1.0, abs=0.07)
     assert np.median(a[bright] / b[bright]) == pytest.approx(1.0, abs=0.08)
 
 
