@@ -85,20 +85,8 @@ def test_the_commands_take_it(rng: np.random.Generator, photos: Path, tmp_path: 
         fsid.denoise(read_raw(noisy), ensemble=3)
 
     testset = tmp_path / "testset"
-    main(
-        [
-            "testset",
-            "photos",
-            str(photos),
-            "-o",
-            str(testset),
-            "--camera",
-            "pixel6",
-            "--iso",
-            "3200",
-            "--quiet",
-        ]
-    )
+    options = ["--camera", "pixel6", "--iso", "3200", "--quiet"]
+    main(["testset", "photos", str(photos), "-o", str(testset), *options])
     assert len(read_testset(testset).images) == 3
     alone, both = (evaluate_models(testset, ["nafnet-small"], ensemble=count).rows[-1] for count in (1, 2))
     assert (alone.model, both.model) == ("nafnet-small", "nafnet-small (mean of 2)")

@@ -42,8 +42,7 @@ def self_ensemble(
         turned_cfa = "".join(_turned(np.array([*cfa]).reshape(2, 2), symmetry).ravel())
         turned_level = level.transposed if symmetry & _TRANSPOSED else level
         total += _turned_back(denoised(_turned(mosaic, symmetry), turned_cfa, turned_level, i), symmetry)
-    if count > 1:
-        total *= np.float32(1 / count)
+    total *= np.float32(1 / count)
     return total
 
 

@@ -126,10 +126,11 @@ class TemporalStatistics:
         return found
 
     def banding_factors(self, cfa: str | None, left_out: np.ndarray, largest: float) -> list[float]:
-        """The squared error of each site's mean variance, 1 where its pixels are independent samples.
+        """Squared error of each site's mean variance, relative to that of independent pixels: 1 or more.
 
-        Those of a row or column with noise in common are not: the mean variances of neighbouring lines then
-        differ by more than those of their pixels explain. largest: variance in medians that counts.
+        Pixels of a row or column with noise in common are not independent: the mean variances of neighbouring
+        lines then differ by more than those of their pixels explain. left_out: (H, W) bool, as for `sites`.
+        largest: up to so many times the median of its site the variance of a pixel counts.
         """
         usable = self._usable(left_out)
         found = []
