@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.ndimage import maximum_filter
+from scipy.ndimage import maximum_filter, minimum_filter
 
 import fsid.assets.skies
 import fsid.render.sky
@@ -661,6 +661,30 @@ def test_a_matt_surface_has_the_light_of_all_the_sky_above_it(renderer: Renderer
     assert np.abs(error).mean() < 0.03
 
 
+def test_a_matt_surface_has_the_light_of_all_walls_before_it(renderer: Renderer) -> None:
+    """L = albedo times the mean of what walls mirror of even light over the half space, by cos(theta)."""
+    albedo, half = np.array([0.7, 0.1, 0.5, 0.2, 0.4, 0.8]), np.array([1.5, 2.5, 1.3])
+    room = replace(
+        view(lambertian(sphere(0.3)), ambient=0.3),
+        room_size_m=tuple(2 * half),
+        room_floor_m=-half[2] / 2,
+        room_materials=tuple(plain((grey,) * 3) for grey in albedo),
+    )
+    frame = draw(renderer, room)
+    on = minimum_filter(frame.object_id == 0, 3)  # without the outline
+    normals = np.concatenate([frame.normal[on].astype(float)[::7], np.eye(3), -np.eye(3)])
+    i = np.arange(20000) + 0.5
+    z, turn = 1 - i / 10000, i * np.pi * (3 - np.sqrt(5))
+    rays = np.stack([np.sqrt(1 - z**2) * np.cos(turn), np.sqrt(1 - z**2) * np.sin(turn), z], -1)
+    reach = (np.sign(rays) * half - (0.0, 0.0, -half[2] / 2)) / rays
+    axis = reach.argmin(-1)
+    seen = albedo[2 * axis + (rays[np.arange(len(rays)), axis] < 0)]
+    arrives = np.maximum(normals @ rays.T, 0.0) @ seen
+    expected = 0.5 * 0.3 * arrives[:-6] / arrives[-6:].mean()
+    error = frame.radiance[on][::7, 1] / expected - 1
+    assert np.abs(error).mean() < 0.06
+
+
 @pytest.mark.parametrize(("rows", "turn"), [(512, 0), (512, 7), (512, 200), (333, 1), (1500, 750)])
 def test_the_sun_in_a_picture_of_the_sky_gives_all_its_light(rows: int, turn: int) -> None:
     """One texel of irradiance 3 wherever it lies: E max(cos, 0) / pi towards each axis, besides the grey."""
@@ -670,7 +694,7 @@ def test_the_sun_in_a_picture_of_the_sky_gives_all_its_light(rows: int, turn: in
     up, around = elevation[row], azimuth[turn]
     to_sun = np.array([np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)])
     expected = 0.2 + 3.0 * np.maximum(np.array([1, -1]) * to_sun[:, None], 0.0).ravel() / np.pi
-    np.testing.assert_allclose(light_sky(picture).sides[:, 1], expected, atol=0.025)
+    np.testing.assert_allclose(light_sky(picture).ambient[:, 1], expected, atol=0.025)
 
 
 def test_a_sky_turns_from_x_towards_y(tmp_path) -> None:

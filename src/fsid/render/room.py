@@ -5,16 +5,16 @@ In a room:
     radiance of a wall point = mean albedo * (E_direct / pi + ambient)      E_direct: lights, without shadows
 
 is laid out on a coarse grid per side; a metal reflects it (so metals are never black). The ambient light
-has the colour of `Scene.ambient` times that of each side (one bounce), normalised so that the mean over the
-six sides has the luminance of `Scene.ambient`: a closed white room gives exactly `ambient` from everywhere.
+is what walls of their mean radiance (one bounce) give a surface low in the middle of the room, as
+irradiance E / pi towards each axis; it is normalised so that the mean over the six axes has the luminance
+of `Scene.ambient`: a closed white room gives exactly `ambient` from everywhere.
 
-Out of doors the sides are the sky, so far away that places do not matter, and the ambient light is
-irradiance E / pi towards each axis. On a surface of normal n it is
+Out of doors the sides are the sky, so far away that places do not matter. On a surface of normal n it is
 
     E(n) = sum over axes a of  n_a^2 (E(a) + E(-a)) / 2 + n_a (E(a) - E(-a)) / 2,
 
 which is all of E but for products of two axes and what lies beyond the second order of spherical harmonics, a
-hundredth of it (Ramamoorthi and Hanrahan 2001).
+hundredth of it under the sky (Ramamoorthi and Hanrahan 2001).
 """
 
 from __future__ import annotations
@@ -30,6 +30,9 @@ from fsid.scene.colour import LUMINANCE
 from fsid.scene.model import Light, Vec3
 
 GRID = 16
+_AMONG_THINGS = 0.25
+"""Height at which the ambient light of a room is taken, relative to its own: most stand on its floor."""
+
 SKY_GRID = 64
 SKY_HALF_M = 1e5
 _PEAK = 10.0
@@ -38,14 +41,14 @@ _PEAK = 10.0
 
 @dataclass(frozen=True, eq=False)
 class Room:
-    """half_m, centre_m: (3,) of the box. sides: (6, 3) diffuse ambient radiance from +x -x +y -y +z -z.
+    """half_m, centre_m: (3,) of the box. ambient: (6, 3) irradiance / pi towards +x -x +y -y +z -z.
 
     radiance: (6, G, G, 3) of the walls, rows and columns along the axes (a + 2) % 3 and (a + 1) % 3.
     """
 
     half_m: np.ndarray
     centre_m: np.ndarray
-    sides: np.ndarray
+    ambient: np.ndarray
     radiance: np.ndarray
 
 
@@ -63,10 +66,11 @@ def light_room(
     direct = np.stack([_irradiance(half, centre, side, lights) for side in range(6)])
     radiance = albedo[:, None, None] * (direct / np.pi + np.array(ambient)) + glow[:, None, None]
     level = direct.mean((1, 2)) @ LUMINANCE / np.pi + float(np.array(ambient) @ LUMINANCE)
-    relative = albedo * level[:, None] + glow
+    shares = _shares(half, np.array([0.0, 0.0, (2 * _AMONG_THINGS - 1) * half[2]])).sum((2, 3))
+    relative = shares @ (albedo * level[:, None] + glow)
     mean = float((relative @ LUMINANCE).mean())
     tint = relative / mean if mean > 0 else np.ones((6, 3))
-    return Room(half, centre, tint * np.array(ambient) + glow, radiance)
+    return Room(half, centre, tint * np.array(ambient) + shares @ glow, radiance)
 
 
 def light_sky(panorama: np.ndarray) -> Room:
@@ -82,11 +86,20 @@ def light_sky(panorama: np.ndarray) -> Room:
     most = np.float32(_PEAK) * panorama.mean()
     radiance = look_up(np.minimum(coarse, most), unit_direction)
     _add_peaks(radiance, panorama, most, (2 / SKY_GRID) ** 2 / norm**3)
-    cosines = np.einsum("sijk,ak->asij", unit_direction, _AXES)
-    weight = np.maximum(cosines, 0.0) / norm**3
-    total = weight.sum((1, 2, 3))[:, None]
-    sides = np.einsum("asij,sijc->ac", weight, radiance) / total
-    return Room(half, np.zeros(3), sides, radiance)
+    shares = _shares(np.ones(3), np.zeros(3))
+    return Room(half, np.zeros(3), np.einsum("asij,sijc->ac", shares, radiance), radiance)
+
+
+def _shares(half: np.ndarray, eye: np.ndarray) -> np.ndarray:
+    """(6, 6, SKY_GRID, SKY_GRID): of the irradiance towards each axis, what comes from each cell of each side
+    of a box that is as bright everywhere. eye: (3,) metres beside its middle."""
+    weight = np.empty((6, 6, SKY_GRID, SKY_GRID))
+    for side in range(6):
+        points, inward = _grid(half, -eye, side, SKY_GRID)
+        cell = half.prod() / half[side // 2]
+        weight[:, side] = np.maximum(_AXES @ points[..., None], 0.0)[..., 0].transpose(2, 0, 1)
+        weight[:, side] *= -cell * (points @ inward) / (points**2).sum(-1) ** 2
+    return np.asarray(weight / weight.sum((1, 2, 3), keepdims=True))
 
 
 def _add_peaks(radiance: np.ndarray, panorama: np.ndarray, most: float, solid_angle: np.ndarray) -> None:

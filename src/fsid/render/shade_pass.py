@@ -154,9 +154,8 @@ def _set_view(program: ScreenProgram, targets: Targets, shot: Shot) -> None:
 def _set_surroundings(program: ScreenProgram, stage: Stage, shot: Shot) -> None:
     room, sky, pixel_rad = stage.room, stage.sky, 2.0 / (shot.lens.focal[0] * stage.view.camera.width)
     program.set(
-        ambient_even=(room.sides[0::2] + room.sides[1::2]) / 2,
-        ambient_odd=(room.sides[0::2] - room.sides[1::2]) / 2,
-        under_sky=float(sky is not None),
+        ambient_even=(room.ambient[0::2] + room.ambient[1::2]) / 2,
+        ambient_odd=(room.ambient[0::2] - room.ambient[1::2]) / 2,
         mean_sides=room.radiance.mean((1, 2)),
         room_half=room.half_m,
         room_centre=room.centre_m,

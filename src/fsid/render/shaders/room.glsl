@@ -1,17 +1,16 @@
 // The surroundings as a light source: see fsid.render.room. Sides in the order +x -x +y -y +z -z.
 layout(binding = 4) uniform sampler2DArray room_radiance;
-uniform vec3 ambient_even[3];    // by axis: mean of the ambient light from its two sides
+uniform vec3 ambient_even[3];    // by axis: mean of irradiance / pi towards its two directions
 uniform vec3 ambient_odd[3];     // and half of what more comes from the positive one
-uniform float under_sky;         // 1 where that is irradiance / pi towards the axes, 0 where it is walls' radiance
 uniform vec3 mean_sides[6];      // mean of room_radiance over each side
 uniform vec3 room_half;          // half size of the room; under the sky so large that places do not matter
 uniform vec3 room_centre;
 
-// Ambient light on a surface of normal n: under the sky what its irradiance is, in a room that of `cube`.
+// Ambient light on a surface of normal n, irradiance / pi.
 vec3 ambient_on(vec3 n) {
-    vec3 even = n * n, odd = n * mix(abs(n), vec3(1.0), under_sky);
+    vec3 even = n * n;
     vec3 light = even.x * ambient_even[0] + even.y * ambient_even[1] + even.z * ambient_even[2]
-               + odd.x * ambient_odd[0] + odd.y * ambient_odd[1] + odd.z * ambient_odd[2];
+               + n.x * ambient_odd[0] + n.y * ambient_odd[1] + n.z * ambient_odd[2];
     return max(light, 0.0);
 }
 
