@@ -30,6 +30,14 @@ def data():
     return json.loads(scene_to_json(sample(FEW, 7, width=64, height=48)))
 
 
+@pytest.mark.parametrize(
+    "text", ["{", "[" * 100_000, '{"seed": ' + "9" * 5000 + "}"], ids=["cut", "deep", "long"]
+)
+def test_what_no_parser_takes_is_one_line(text):
+    with pytest.raises(FsidError, match=r"^scene JSON: is not valid JSON"):
+        scene_from_json(text)
+
+
 def test_an_unknown_key_is_named(data):
     data["lights"][0]["colou"] = 1
     with pytest.raises(FsidError, match=r"unknown key scene\.lights\[0\]\.colou"):

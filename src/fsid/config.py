@@ -184,8 +184,8 @@ def read_json(file: Path) -> Any:
     return parse_json(read_whole(file), str(file))
 
 
-def parse_json(data: bytes, source: str) -> Any:
-    """What JSON in UTF-8, 16 or 32 holds; FsidError, naming `source`, where it is broken."""
+def parse_json(data: bytes | str, source: str) -> Any:
+    """What JSON, as text or in UTF-8, 16 or 32, holds; FsidError, naming `source`, where it is broken."""
     try:
         return json.loads(data)
     except (ValueError, RecursionError) as error:

@@ -13,7 +13,7 @@ from types import GenericAlias, NoneType, UnionType
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
 from fsid.assets import BACKGROUND_PARTS
-from fsid.config import to_plain
+from fsid.config import parse_json, to_plain
 from fsid.errors import FsidError
 from fsid.scene.check import check_scene
 from fsid.scene.lens import check_distortion, corner_radius
@@ -31,13 +31,7 @@ def scene_to_json(scene: Scene) -> str:
 
 def scene_from_json(text: str) -> Scene:
     """The scene written by `scene_to_json`. Raises FsidError that names the offending key."""
-    try:
-        data = json.loads(text)
-    except json.JSONDecodeError as error:
-        raise FsidError(f"scene JSON: not valid at line {error.lineno}: {error.msg}") from None
-    except RecursionError:
-        raise FsidError("scene JSON: is nested too deeply") from None
-    scene: Scene = _read(Scene, data, "scene")
+    scene: Scene = _read(Scene, parse_json(text, "scene JSON"), "scene")
     _expect(len(scene.cameras) > 0, "scene.cameras", "at least one")
     for key in ("materials", "transforms"):
         _expect(len(getattr(scene, key)) == len(scene.objects), f"scene.{key}", "as long as scene.objects")
