@@ -49,7 +49,7 @@ def _settings() -> Iterator[Any]:
     from fsid.dataset.loader import PatchConfig
     from fsid.denoise import TrainConfig
     from fsid.evaluate.demo import DemoConfig
-    from fsid.evaluate.experiments import scale_config
+    from fsid.evaluate.experiment_config import scale_config
 
     yield from (TrainConfig(), TrainConfig().network, DemoConfig(), scale_config("ablation", "cpu"))
     yield PatchConfig(32, 4, ("pixel6",), 400.0, 8000.0)

@@ -23,8 +23,9 @@ from fsid.evaluate.claim import claimed
 from fsid.evaluate.compare import ImageRow, write_images
 from fsid.evaluate.dead_leaves import RADIUS_PX, dead_leaves_rand, write_dead_leaves
 from fsid.evaluate.demo import ISOS, DemoConfig, _copy_photographs
+from fsid.evaluate.experiment_config import PHOTOGRAPHS, scale_config
 from fsid.evaluate.experiment_report import gaps
-from fsid.evaluate.experiments import PHOTOGRAPHS, TEST_ISOS, _data, _read_images, _training, scale_config
+from fsid.evaluate.experiments import TEST_ISOS, _data, _read_images, _training
 from fsid.evaluate.known import known_pictures
 from fsid.sensor import load_profile, save_profile
 

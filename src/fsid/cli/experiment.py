@@ -59,8 +59,8 @@ def experiment(
         quiet: No progress bar.
     """
     from fsid.errors import FsidError
+    from fsid.evaluate.experiment_config import scale_config
     from fsid.evaluate.experiments import experiment as run_experiment
-    from fsid.evaluate.experiments import scale_config
 
     if kind == "ablation" and photos is not None:
         raise FsidError("--photos: only real-vs-synthetic trains on photographs")

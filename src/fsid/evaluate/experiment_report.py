@@ -12,18 +12,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from fsid.dataset.inspect_plot import as_label
 from fsid.evaluate.compare import ImageRow, Row
+from fsid.evaluate.experiment_config import ExperimentConfig
 from fsid.evaluate.report import METRICS, Section, Table, level_label, method_label, plot, write_report
 from fsid.evaluate.testset import ALL_SETS
-
-if TYPE_CHECKING:
-    from fsid.evaluate.experiments import ExperimentConfig
 
 DECIBELS = METRICS[:2]
 PAPER_GAP = {"0.5lux": -0.40, "1lux": -0.74, "2lux": 0.01, "5lux": -0.14}

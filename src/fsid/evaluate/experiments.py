@@ -15,14 +15,12 @@ import io
 import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from itertools import product
 from pathlib import Path
-from typing import Literal
 
-from fsid.config import Override, check_fields, given_keys, load_settings
+from fsid.config import Override, given_keys, load_settings
 from fsid.dataset import (
-    RENDERED,
     GenerateConfig,
     check_given,
     check_pictures,
@@ -46,105 +44,26 @@ from fsid.evaluate.compare import (
     write_results,
 )
 from fsid.evaluate.dead_leaves import write_dead_leaves
+from fsid.evaluate.experiment_config import (
+    DEAD_LEAVES,
+    MATERIALS_SET,
+    PHOTOGRAPHS,
+    SCENES,
+    SOURCES,
+    ExperimentConfig,
+    set_name,
+)
 from fsid.evaluate.experiment_report import write_experiment_report
 from fsid.evaluate.known import known_note
 from fsid.evaluate.models import model_method
 from fsid.evaluate.simulated import LUXES, simulated_testset
-from fsid.evaluate.testbench import MATERIALS
-from fsid.evaluate.testset import ALL_SETS, levels_of, photo_testset, read_testset
+from fsid.evaluate.testset import levels_of, photo_testset, read_testset
 from fsid.files import make_folder, read_whole
 from fsid.scene import VARIANTS
 from fsid.sensor import load_bayer_profile
 
-Kind = Literal["ablation", "real-vs-synthetic"]
 ProgressBar = Callable[[str, str], AbstractContextManager[Callable[[int, int], None]]]
-
-PHOTOGRAPHS, DEAD_LEAVES, SCENES = "photographs", "dead-leaves", "full"
-SOURCES: dict[Kind, tuple[str, ...]] = {
-    "ablation": VARIANTS,
-    "real-vs-synthetic": (PHOTOGRAPHS, SCENES, DEAD_LEAVES),
-}
-_PHOTOGRAPH_PX = 1024
-"""Windows of photographs are at least so large: small frames suit scenes, but would only cut pictures."""
-_NOT_OF_SCENES = {field.name for field in fields(GenerateConfig)} - {*RENDERED, "checks"} | {"variant"}
-MATERIALS_SET = "materials"
 TEST_ISOS = (800, 1600, 3200, 6400)
-
-
-@dataclass(frozen=True)
-class ExperimentConfig:
-    """One experiment: with its folder of photographs, everything that its result depends on.
-
-    count: pairs per source, width x height pixels each (photographs: at least every one of the folder, and
-    windows of at least 1024 pixels a side where they have them). steps: of every training, 0 takes those of
-    the configuration `network` (a built-in name or a YAML file). seeds: one training per source and seed.
-    photos: folder to train the real rival on. tests: folders of photographs to measure on, beside the
-    simulated materials (materials_scenes pictures of each, test_width x test_height).
-    camera: noise profile of data, trainings and tests. settings: `key=value` of the generator that say how
-    scenes are, for every source of scenes. train_settings: of every training.
-    """
-
-    kind: Kind
-    count: int
-    steps: int
-    network: str
-    seeds: tuple[int, ...]
-    width: int
-    height: int
-    camera: str = "pixel6"
-    photos: str = ""
-    tests: tuple[str, ...] = ()
-    materials_scenes: int = 3
-    test_width: int = 768
-    test_height: int = 576
-    settings: tuple[str, ...] = ()
-    train_settings: tuple[str, ...] = ()
-
-    def __post_init__(self) -> None:
-        check_fields(self)
-        if min(self.count, self.materials_scenes) < 1 or self.steps < 0 or not self.seeds:
-            raise FsidError("--count and --seeds must name at least one, --steps must not be negative")
-        if len(set(self.seeds)) < len(self.seeds):
-            raise FsidError(f"--seeds {' '.join(map(str, self.seeds))}: give different ones")
-        if not all(0 <= seed < 2**64 for seed in self.seeds):
-            raise FsidError(f"--seeds {' '.join(map(str, self.seeds))}: must be at least 0 and below 2^64")
-        if self.kind == "real-vs-synthetic" and not self.photos:
-            raise FsidError("--photos: name the folder of photographs that the real rival is trained on")
-        for key in (setting.partition("=")[0] for setting in self.settings):
-            if key.partition(".")[0] in _NOT_OF_SCENES:
-                raise FsidError(f"--set {key}: is no setting of the scenes alone; rivals share all others")
-        names = [MATERIALS_SET, ALL_SETS, *MATERIALS, *map(_set_name, self.tests)]
-        for folder in self.tests:
-            if names.count(name := _set_name(folder)) > 1:
-                raise FsidError(f"--test {folder}: another test set is called {name}, too; rename the folder")
-
-    def frame_px(self, source: str) -> tuple[int, int]:
-        """Width and height of the frames of a source; photographs have them at most."""
-        least = _PHOTOGRAPH_PX if source == PHOTOGRAPHS else 0
-        return max(self.width, least), max(self.height, least)
-
-
-def scale_config(kind: Kind, scale: str) -> ExperimentConfig:
-    """The settings of a scale: "smoke" (minutes), "cpu" (hours on two cores), "paper" (175,000 pairs)."""
-    photos = "." if kind == "real-vs-synthetic" else ""
-    if scale == "smoke":
-        tiny = (
-            "network.width=8",
-            "held_out=0",
-            "batch=2",
-            "patch_px=16",
-            "warmup_steps=2",
-            "validate_every=1000",
-        )
-        return ExperimentConfig(
-            kind, 4, 30, "nafnet-tiny", (0, 1), 128, 96, photos=photos, materials_scenes=1,
-            test_width=96, test_height=96, train_settings=tiny,
-        )  # fmt: skip
-    if scale == "cpu":
-        return ExperimentConfig(kind, 800, 6000, "nafnet-tiny", (0, 1), 480, 270, photos=photos)
-    if scale == "paper":
-        return ExperimentConfig(kind, 175_000, 0, "paper", (0, 1), 1920, 1080, photos=photos)
-    raise FsidError(f"--scale {scale}: choose smoke, cpu or paper")
 
 
 @contextmanager
@@ -162,11 +81,11 @@ def experiment(
 ) -> Path:
     """Run it in `out`, or go on with it; returns the path of the report.
 
-    Writes results.json (the rows of all test sets), images.csv and report.html. config: of `scale_config`, or
-    one's own. bar(label, unit): for every stage a context manager that yields its progress(done, total).
-    workers: processes that render; they import the calling script, so a script calls this under `if __name__
-    == "__main__":`. note(line): called before the work where test photographs are copies of what the real
-    rival is trained on.
+    Writes results.json (the rows of all test sets), images.csv and report.html. config: of
+    `experiment_config.scale_config`, or one's own. bar(label, unit): for every stage a context manager that
+    yields its progress(done, total). workers: processes that render; they import the calling script, so a
+    script calls this under `if __name__ == "__main__":`. note(line): called before the work where test
+    photographs are copies of what the real rival is trained on.
     """
     out = Path(out)
     _check(out, config, bar, workers)
@@ -226,7 +145,7 @@ def _known(config: ExperimentConfig, workers: int) -> str:
     """Which test photographs the real rival is trained on, for note and report."""
     if PHOTOGRAPHS not in SOURCES[config.kind]:
         return ""
-    tests = {_set_name(folder): find_photos(folder) for folder in config.tests}
+    tests = {set_name(folder): find_photos(folder) for folder in config.tests}
     threads = max(min(workers, os.cpu_count() or 1), 1)
     return known_note(tests, find_pictures(Path(config.photos)), threads)
 
@@ -301,7 +220,7 @@ def _testsets(out: Path, config: ExperimentConfig, bar: ProgressBar) -> list[Pat
                 progress=progress,
             )
     for folder in config.tests:
-        path = root / _set_name(folder)
+        path = root / set_name(folder)
         found.append(path)
         if not (path / "testset.json").exists():
             with bar(f"test set {path.name}", "photographs") as progress:
@@ -313,10 +232,6 @@ def _testsets(out: Path, config: ExperimentConfig, bar: ProgressBar) -> list[Pat
                 "differ); put those back, or use another folder"
             )
     return found
-
-
-def _set_name(folder: str) -> str:
-    return Path(folder).resolve().name
 
 
 def _measured(
