@@ -199,8 +199,12 @@ def test_no_frame_is_written_over(tmp_path, rng, refused):
 def test_a_frame_of_another_size_is_named(tmp_path, rng):
     paths = write_burst(tmp_path / "frames", rng, scene(0.5, 64), 1600, 3)
     larger = write_burst(tmp_path / "larger", rng, scene(0.5, 80), 1600, 3)
-    with pytest.raises(FsidError, match=r"larger/000\.dng of the burst is \(80, 80\)"):
-        calibrate([*paths, larger[0]], name="x")
+    words = r"larger/000\.dng: is 80x80, the first frame 64x64; .* one mode"
+    _fails(words, [*paths, larger[0]])
+    dark = write_burst(tmp_path / "dark", rng, scene(0.0, 64), 1600, 3)
+    binned = write_burst(tmp_path / "binned", rng, scene(0.0, 32), 1600, 3)  # has less noise
+    _fails(r"binned/000\.dng: is 32x32, the first frame 64x64", paths, dark=binned)
+    _fails(words, [*paths, *larger], dark=dark)
 
 
 def test_the_name_of_a_camera_is_printed_as_it_is(tmp_path, rng, capsys):

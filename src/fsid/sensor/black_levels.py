@@ -72,11 +72,6 @@ class BlackLevels:
         """(4,) mean DN that `levelled` takes off R, Gr, Gb, B."""
         return pack(np.rint(self._above_whole_tiles(black)), cfa).mean(axis=(1, 2), dtype=np.float64)
 
-    def fits(self, shape: tuple[int, ...]) -> bool:
-        """Whether an image of another size (H, W) has these levels, too."""
-        within = shape[0] <= len(self.of_row) and shape[1] <= len(self.of_column)
-        return within or not (self.of_row.any() or self.of_column.any())
-
     def _deltas(self, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
         if self.of_row.any() or self.of_column.any():
             return self.of_row[: shape[0]], self.of_column[: shape[1]]

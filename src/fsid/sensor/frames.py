@@ -40,6 +40,7 @@ class Camera:
     """What all frames of a calibration share. cfa: None without filters. black_level: None where unknown.
 
     black: of every pixel of the first frame, of bare mosaics what the caller states; None where unknown.
+    shape: (H, W).
     """
 
     name: str
@@ -47,6 +48,7 @@ class Camera:
     black_level: int | None
     white_level: int
     bare: bool
+    shape: tuple[int, ...]
     black: BlackLevels | None = None
 
     def site_black(self) -> np.ndarray | None:
@@ -111,8 +113,12 @@ class FrameSet:
                 f"{frame.path}: CFA, black and white level are {found}, those of the first frame {expected}; "
                 f"give frames of one camera in one mode"
             )
-        if not camera.black.fits(stored.dn.shape):
-            raise FsidError(f"{frame.path}: is larger than the first frame, whose rows differ in black level")
+        if stored.dn.shape != camera.shape:
+            (height, width), (rows, columns) = stored.dn.shape, camera.shape
+            raise FsidError(
+                f"{frame.path}: is {width}x{height}, the first frame {columns}x{rows}; "
+                f"give frames of one camera in one mode"
+            )
         return camera.black.levelled(stored.dn, camera.black_level, camera.white_level)
 
 
@@ -184,7 +190,15 @@ def _raw_frames(paths: Sequence[Path], dark: Sequence[Path], layout: Layout) -> 
                 f"{path}: is from camera {header.camera!r}, the first frame from {name!r}; "
                 f"calibrate one camera at a time"
             )
-    camera = Camera(name, first.cfa, first.black_level, first.white_level, bare=False, black=first.black)
+    camera = Camera(
+        name,
+        first.cfa,
+        first.black_level,
+        first.white_level,
+        bare=False,
+        shape=first.dn.shape,
+        black=first.black,
+    )
     if replace(layout, iso=None) != Layout():
         raise FsidError(
             f"{paths[0]}: a RAW file states its CFA, levels and size itself; leave the options out"
@@ -206,10 +220,10 @@ def _bare_frames(paths: Sequence[Path], dark: Sequence[Path], layout: Layout) ->
     black = None if levels is None else BlackLevels.stated(levels, cfa, "--black-level")
     level = None if black is None else round(black.mean())
     frames: list[Frame] = []
-    highest, shape = 0, None
+    highest, shape = 0, ()
     for number, path in enumerate((*paths, *dark)):
         dn = read_dn(path, cfa=cfa, width=layout.width, height=layout.height)
-        if shape not in (None, dn.shape):
+        if shape not in ((), dn.shape):
             raise FsidError(f"{path}: is {dn.shape[1]}x{dn.shape[0]}, the first frame is another size")
         if number == 0:
             check_bayer(dn, path)
@@ -233,7 +247,7 @@ def _bare_frames(paths: Sequence[Path], dark: Sequence[Path], layout: Layout) ->
     frames, assumed = _with_iso(frames, layout.iso)
     for stated in (0.0,) if black is None else (black.tile.min(), black.tile.max()):
         check_levels(stated, white, str(paths[0]))
-    camera = Camera("", cfa, level, white, bare=True, black=black)
+    camera = Camera("", cfa, level, white, bare=True, shape=shape, black=black)
     return FrameSet(camera, tuple(frames[: len(paths)]), tuple(frames[len(paths) :]), "", (*notes, *assumed))
 
 
