@@ -16,7 +16,7 @@ from fsid.evaluate import NOISY, burst_testset, compare, psnr, read_testset, sim
 from fsid.evaluate.bursts import average
 from fsid.evaluate.placing import shift_between
 from fsid.sensor import NoiseLevel, NoiseTerms, Raw, load_profile, noisy_from_clean, read_raw, write_dng
-from fsid.sensor.metadata import ORIENTATION, Metadata
+from fsid.sensor.metadata import ORIENTATION, Metadata, exposure_metadata
 from fsid.sensor.tiff import SHORT, Tag
 from stated_black import state_black
 
@@ -374,6 +374,44 @@ def test_what_spoils_a_burst_is_named(clean: Raw, tmp_path: Path, light: list[fl
     with pytest.raises(FsidError, match=words) as caught:
         average(paths[1:], paths[0])
     assert "tripod" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("odd", "words"),
+    [
+        ({"camera": "Other Phone"}, "camera Other Phone differs from"),
+        ({"mosaic": np.full((64, 96), 0.2, np.float32)}, "size 96x64 differs from 128x96"),
+        ({"cfa": "RGGB"}, "filter pattern RGGB differs from GBRG"),
+        ({"white_level": 4095}, "white level 4095 differs from 1023"),
+        ({"black_level": 80}, "black level 80 differs from 64"),
+        ({"iso": 800.0}, "ISO 800 differs from 1600"),
+        ({"metadata": exposure_metadata(exposure_s=0.01)}, "exposure time in s 0.01 differs from 0.02"),
+    ],
+    ids=lambda value: next(iter(value)) if isinstance(value, dict) else "",
+)
+def test_a_frame_of_another_camera_or_setting_is_named(clean: Raw, tmp_path: Path, odd, words, refused):
+    known = replace(clean, metadata=exposure_metadata(exposure_s=0.02))
+    paths = _burst(tmp_path / "captures" / "star" / "1lux", known)
+    write_dng(paths[5], replace(read_raw(paths[5]), **odd))
+    told = refused("testset", "from-bursts", tmp_path / "captures", "-o", tmp_path / "set", "--quiet")
+    assert f"005.dng: {words}" in told
+
+
+def test_black_levels_and_times_that_phones_measure_anew_are_those_of_one_burst(clean: Raw, tmp_path: Path):
+    known = replace(clean, metadata=exposure_metadata(exposure_s=0.02))
+    paths = _burst(tmp_path / "b", known)
+    other = replace(read_raw(paths[5]), black_level=66, metadata=exposure_metadata(exposure_s=0.0202))
+    write_dng(paths[5], other)
+    assert average(paths[1:], paths[0])[1].frames == FRAMES - 1
+
+
+def test_bursts_of_two_cameras_are_no_test_set(clean: Raw, tmp_path: Path, refused):
+    """The set states one camera, and results name it: the second one's would be taken for its."""
+    captures = tmp_path / "captures"
+    _burst(captures / "a" / "1lux", clean)
+    _burst(captures / "b" / "1lux", replace(clean, camera="Other Phone"))
+    told = refused("testset", "from-bursts", captures, "-o", tmp_path / "set", "--quiet")
+    assert "000.dng: is from camera 'Other Phone'" in told
 
 
 def test_a_scene_that_no_test_set_can_have_is_refused_before_the_work(clean: Raw, tmp_path: Path):

@@ -42,6 +42,7 @@ from fsid.sensor import (
     write_dng,
 )
 from fsid.sensor.blind import stated_noise
+from fsid.sensor.dng import read_header
 from fsid.sensor.frames import BESIDE_RAW
 
 OUTLIER_SIGMA = 4.0
@@ -94,6 +95,7 @@ def burst_testset(
     for scene in scenes:
         if missing := [level for level in levels if (scene, level) not in bursts]:
             raise FsidError(f"{captures / scene}: has no burst {missing[0]}; every scene needs every level")
+    _check_one_camera([paths[0] for paths in bursts.values()])
     qualities = []
     name = load_profile(camera).name if camera else ""
     images = tuple(TestImage(scene, scene) for scene in scenes)
@@ -205,6 +207,16 @@ def _find_bursts(captures: Path, frames: int) -> dict[tuple[str, str], list[Path
             f"{captures}: holds no bursts; expected <scene>/<level>/frames, for example star/0.5lux/"
         )
     return found
+
+
+def _check_one_camera(paths: Sequence[Path]) -> None:
+    """FsidError where bursts, of which these are the first frames, are of several cameras."""
+    name = read_header(paths[0]).camera
+    for path in paths:
+        if (other := read_header(path).camera) != name:
+            raise FsidError(
+                f"{path}: is from camera {other!r}, {paths[0]} from {name!r}; a test set is of one camera"
+            )
 
 
 def _folders(folder: Path) -> list[Path]:

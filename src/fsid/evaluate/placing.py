@@ -37,6 +37,8 @@ MAX_SUBPIXEL = 0.15
 MAX_SHIFT_TILES = 32
 MAX_SHIFT_SHARE = 1 / 8
 """Largest shift, in edges of the image."""
+SAME_BLACK = 0.01
+"""Of the range: largest difference of the black levels that two frames of one mode state."""
 SIGNIFICANT = 5.0
 """Standard errors by which a shift must show."""
 LEAST_LIGHT_DN = 0.5
@@ -113,10 +115,7 @@ def _are_alike(frames: Sequence[Placed]) -> bool:
 def place(path: Path, first: Raw) -> Placed:
     """How a frame lies on the first, which has light, and whether it moved or flickered too much."""
     raw = read_raw(path)
-    if raw.mosaic.shape != first.mosaic.shape or raw.cfa != first.cfa:
-        raise FsidError(f"{path}: size or CFA differs from the other frames of the burst")
-    if raw.iso != first.iso:
-        raise FsidError(f"{path}: ISO {raw.iso:g} differs from ISO {first.iso:g} of the burst's first frame")
+    _check_alike(path, raw, first)
     ours, theirs = (green(r) for r in (raw, first))
     brightness = float(ours.sum() / theirs.sum())
     whole, rest = shift_between(ours - (ours.mean() - theirs.mean()), theirs)
@@ -133,6 +132,33 @@ def place(path: Path, first: Raw) -> Placed:
         rest=(float(rest[0]), float(rest[1])),
         fault=fault if abs(gain - 1) <= MAX_FLICKER else _FLICKERED,
     )
+
+
+def _check_alike(path: Path, raw: Raw, first: Raw) -> None:
+    """FsidError where a frame states another camera, mode or setting than the first one."""
+    stated: list[tuple[str, str | float, str | float]] = [
+        ("camera", raw.camera, first.camera),
+        ("size", _size(raw), _size(first)),
+        ("filter pattern", raw.cfa, first.cfa),
+        ("white level", raw.white_level, first.white_level),
+        ("ISO", raw.iso, first.iso),
+    ]
+    if abs(raw.black_level - first.black_level) > SAME_BLACK * (first.white_level - first.black_level):
+        stated.append(("black level", raw.black_level, first.black_level))
+    ours_s, theirs_s = raw.metadata.exposure_s, first.metadata.exposure_s
+    if ours_s and theirs_s and abs(ours_s / theirs_s - 1) > MAX_FLICKER:
+        stated.append(("exposure time in s", ours_s, theirs_s))
+    for what, ours, theirs in stated:
+        if ours != theirs:
+            ours, theirs = (f"{v:.4g}" if isinstance(v, float) else v for v in (ours, theirs))
+            raise FsidError(
+                f"{path}: {what} {ours} differs from {theirs} of the burst's first frame; "
+                f"a burst is of one camera in one setting"
+            )
+
+
+def _size(raw: Raw) -> str:
+    return "x".join(map(str, raw.mosaic.shape[::-1]))
 
 
 def _light(whole: np.ndarray, ours: np.ndarray, theirs: np.ndarray, span: int) -> tuple[float, float, float]:

@@ -49,6 +49,11 @@ class Metadata:
         values = next((tag.values for tag in self.first if tag.code == ORIENTATION), ())
         return int(values[0]) if len(values) and not isinstance(values, bytes) else 1
 
+    @property
+    def exposure_s(self) -> float:
+        """Exposure time in seconds; 0 where nothing is said."""
+        return next((value for tag in self.exif if tag.code == EXPOSURE_TIME for value in _numbers(tag)), 0.0)
+
     def within(self, width: int, height: int) -> Metadata:
         """The same for an image of that many pixels: a crop that reaches beyond them ends there."""
         crop = {tag.code: tag for tag in self.mosaic if tag.code in (CROP_ORIGIN, CROP_SIZE)}
