@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
@@ -28,6 +29,7 @@ from scipy.ndimage import uniform_filter
 from fsid.counted import counted
 from fsid.errors import FsidError
 from fsid.evaluate.beside import Departure, beside2
+from fsid.evaluate.cut_off import before_cut_off
 from fsid.evaluate.placing import LEAST_FRAMES, Placed, Window, place, read_first, too_few
 from fsid.evaluate.testset import Progress, TestImage, TestSet, staged, write_testset
 from fsid.files import write_atomically
@@ -42,8 +44,9 @@ from fsid.sensor import (
     write_dng,
 )
 from fsid.sensor.blind import stated_noise
-from fsid.sensor.dng import read_header
+from fsid.sensor.dng import read_header, read_stored
 from fsid.sensor.frames import BESIDE_RAW
+from fsid.sensor.quantise import MAX_DN
 
 OUTLIER_SIGMA = 4.0
 SPECK_SIGMA = 10.0
@@ -107,7 +110,7 @@ def burst_testset(
             noisy = _noisy_frames(paths, frames)
             others = [path for path in paths if path not in noisy]
             truth, quality, window = average(others, paths[0], scene, level)
-            write_dng(root / scene / f"{level}.clean.dng", clean_levels(truth))
+            write_dng(root / scene / f"{level}.clean.dng", clean_levels(_lifted(truth)))
             for frame, path in enumerate(noisy):
                 raw = _cut(read_raw(path), window)
                 name = name or raw.camera
@@ -135,7 +138,7 @@ def average(
         raise too_few(reference, every)
     window = _common_window(placed, first)
     seen = _cut(first, window)
-    mean = _trimmed_mean(placed, window, seen.mosaic)
+    mean = _trimmed_mean(placed, window, seen, _of_dn_0(reference)[window])
     shared2 = float(np.mean([p.error2 for p in placed])) / 2
     error = float(np.sqrt(mean.noise2 + shared2 + mean.beside2))
     quality = TruthQuality(
@@ -163,7 +166,8 @@ class _Mean:
     beside2: float
 
 
-def _trimmed_mean(placed: Sequence[Placed], window: Window, first: np.ndarray) -> _Mean:
+def _trimmed_mean(placed: Sequence[Placed], window: Window, first: Raw, lowest: np.ndarray) -> _Mean:
+    """lowest: (H, W) x of DN 0."""
     mean, variance = _moments(placed, window)
     used, total, square = (np.zeros(mean.shape) for _ in range(3))
     departures = []
@@ -177,15 +181,25 @@ def _trimmed_mean(placed: Sequence[Placed], window: Window, first: np.ndarray) -
     change = total / np.maximum(used, 1)
     spread = np.where(used > 1, (square - total * change) / np.maximum(used - 1, 1), variance)
     unlike = float(np.mean(spread**2) / max(np.mean(spread) ** 2, 1e-30))
-    reach = SPECK_SIGMA * np.sqrt(_spread_over_site(variance))
+    reach = SPECK_SIGMA * np.sqrt(_mean_of_site(variance))
     off = Departure.of(change)
     others, gains = [departure.less(off) for departure in departures], [p.gain for p in placed]
+    beside = Departure.of((first.mosaic - mean - change).clip(-reach, reach))
+    span = first.white_level - first.black_level
+    dn, near_dn2 = span * (mean + change - lowest), span**2 * _mean_of_site(spread)
+    light_dn, slope = before_cut_off(dn, _mean_of_site(dn), near_dn2)
     return _Mean(
-        truth=(mean + change).astype(np.float32),
+        truth=(lowest + light_dn / span).astype(np.float32),
         outliers=float(1 - used.mean() / len(placed)),
-        noise2=float(np.mean(spread / np.maximum(used, 1))),
-        beside2=beside2(Departure.of((first - mean - change).clip(-reach, reach)), others, gains, unlike),
+        noise2=float(np.mean(slope**2 * spread / np.maximum(used, 1))),
+        beside2=beside2(beside, others, gains, unlike),
     )
+
+
+def _of_dn_0(path: Path) -> np.ndarray:
+    """(H, W) x of DN 0, that of the pixels' own black levels."""
+    stored = read_stored(path)
+    return stored.black.normalised(np.zeros_like(stored.dn), stored.black_level, stored.white_level)
 
 
 def _find_bursts(captures: Path, frames: int) -> dict[tuple[str, str], list[Path]]:
@@ -278,15 +292,15 @@ def _is_like_the_others(deviation: np.ndarray, variance: np.ndarray, frames: int
     of their mean, by their spread, since in a short burst an outlier widens that of all beyond itself."""
     share = frames / (frames - 1)
     others = ((frames - 1) * variance - share * deviation**2) / (frames - 2)
-    limit = OUTLIER_SIGMA * np.sqrt(_spread_over_site(others))
+    limit = OUTLIER_SIGMA * np.sqrt(_mean_of_site(others))
     return np.asarray(np.sqrt(share) * np.abs(deviation) <= limit + 1e-9)
 
 
-def _spread_over_site(variance: np.ndarray) -> np.ndarray:
-    """The variance averaged over neighbours of the same CFA site: one pixel's own is from too few frames."""
-    out = np.empty_like(variance)
+def _mean_of_site(values: np.ndarray) -> np.ndarray:
+    """Averages over neighbours of the same CFA site: a pixel's own variance is from too few frames."""
+    out = np.empty_like(values)
     for row, column in ((0, 0), (0, 1), (1, 0), (1, 1)):
-        out[row::2, column::2] = uniform_filter(variance[row::2, column::2], _PATCH_TILES, mode="reflect")
+        out[row::2, column::2] = uniform_filter(values[row::2, column::2], _PATCH_TILES, mode="reflect")
     return np.maximum(out, 0)
 
 
@@ -317,6 +331,13 @@ def _level_order(level: str) -> tuple[float, str]:
         return float(digits), level
     except ValueError:
         return float("inf"), level
+
+
+def _lifted(truth: Raw) -> Raw:
+    """The same truth with levels as many DN higher as it reaches below DN 0, which a file cuts off."""
+    least_dn = truth.black_level + float(truth.mosaic.min()) * (truth.white_level - truth.black_level)
+    lift = min(max(-math.floor(least_dn), 0), MAX_DN - truth.white_level)
+    return replace(truth, black_level=truth.black_level + lift, white_level=truth.white_level + lift)
 
 
 def _csv(qualities: Sequence[TruthQuality]) -> str:
