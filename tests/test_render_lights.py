@@ -18,7 +18,7 @@ from fsid.render.lamps import hoods_apart, lamps_of
 from fsid.render.room import light_sky
 from fsid.render.sky import angles, panorama
 from fsid.scene import SceneConfig, sample
-from fsid.scene.model import Background, Camera, Light, Sky, Transform, Vec3
+from fsid.scene.model import ZERO, Background, Camera, Light, Sky, Transform, Vec3
 from render_scenes import (
     FROM_ABOVE,
     STILL,
@@ -582,7 +582,7 @@ def test_a_large_sky_is_averaged_and_read_once(tmp_path, monkeypatch) -> None:
     sky = Sky(f"file:{path}", ONE)
     write_exr(path, light)
     found = panorama(sky)
-    expected = light.reshape(32, 2, 64, 2, 3).mean((1, 3))
+    expected = light.reshape(32, 2, 64, 2, 3).mean((1, 3))[:, ::-1]
     np.testing.assert_allclose(found / found[3, 3], expected / expected[3, 3], rtol=1e-5)
     with monkeypatch.context() as patch:
         patch.setattr(fsid.render.sky, "_read_exr", None)
@@ -698,9 +698,23 @@ def test_the_sun_in_a_picture_of_the_sky_gives_all_its_light(rows: int, turn: in
 
 
 def test_a_sky_turns_from_x_towards_y(tmp_path) -> None:
-    """Column 0 is +x: turned by 90 degrees it is a quarter of the width to the right, +y."""
+    """Column 0 of a picture ends at +x: turned by 90 degrees it ends at +y."""
     light = np.ones((16, 32, 3), np.float32)
     light[:, 0] = 9
     write_exr(tmp_path / "sky.exr", light)
     picture = panorama(Sky(f"file:{tmp_path / 'sky.exr'}", ONE, azimuth_deg=90.0))
-    assert set(picture[..., 0].argmax(axis=1)) == {8}
+    assert set(picture[..., 0].argmax(axis=1)) == {7}
+
+
+def test_a_picture_of_the_sky_is_not_seen_mirrored(renderer: Renderer, tmp_path) -> None:
+    """What is to the right in it is to the right for who stands in it."""
+    light = np.full((32, 64, 3), 0.1, np.float32)
+    light[:, :8, 0] = light[:, 8:16, 1] = 1.0
+    write_exr(tmp_path / "sky.exr", light)
+    sky = Sky(f"file:{tmp_path / 'sky.exr'}", ONE)
+    angle = -2 * np.pi * 8 / 64  # where red meets green
+    ahead = Camera(ZERO, (float(np.cos(angle)), float(np.sin(angle)), 0.0), (0.0, 0.0, 1.0), 40.0, 32, 32)
+    sheet = lambertian(grid(0.1), at=replace(STILL, position_m=(0.0, 0.0, -9.0)))
+    left, right = np.hsplit(draw(renderer, replace(view(sheet, camera=ahead), sky=sky)).radiance, 2)
+    assert (left[:, :-1, 0] > 2 * left[:, :-1, 1]).all()
+    assert (right[:, 1:, 1] > 2 * right[:, 1:, 0]).all()

@@ -4,8 +4,9 @@
     clouds       where fractal value noise exceeds a level set by `cloudiness`: white, greyer the thicker
 
 scaled so that the mean radiance of the upper half (by solid angle) is `Sky.colour`. A picture file is scaled
-likewise; one of more than `MOST_HEIGHT` rows is averaged to fewer, because as float32 it would take more
-memory than all the rest of a scene.
+likewise, and its columns, which go to the right as one stands in it, turn the other way; one of more than
+`MOST_HEIGHT` rows is averaged to fewer, because as float32 it would take more memory than all the rest of a
+scene.
 """
 
 from __future__ import annotations
@@ -165,12 +166,12 @@ def _check_size(width: int, height: int, path: Path) -> None:
 
 
 def _equirectangular(channels: Iterable[np.ndarray], path: Path) -> np.ndarray:
-    """The picture of the channels R, G, B, (H, 2 H) each and all alike, reduced; FsidError where it gives no
-    light. They come one by one because a large panorama fills memory."""
+    """The panorama of a picture's channels R, G, B, (H, 2 H) each and all alike, reduced; FsidError where it
+    gives no light. They come one by one because a large one fills memory."""
     picture = np.stack([_reduced(channel, path) for channel in channels], axis=-1)
     if not _mean_above(picture) @ LUMINANCE > _LEAST_LIGHT * picture.max():
         raise FsidError(f"{path}: its upper half is black and gives no light; turn it over or leave it out")
-    return picture
+    return picture[:, ::-1]
 
 
 def _reduced(channel: np.ndarray, path: Path) -> np.ndarray:
