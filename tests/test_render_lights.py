@@ -697,6 +697,36 @@ def test_the_sun_in_a_picture_of_the_sky_gives_all_its_light(rows: int, turn: in
     np.testing.assert_allclose(light_sky(picture).ambient[:, 1], expected, atol=0.025)
 
 
+def test_the_sun_in_a_picture_of_the_sky_is_a_sun(renderer: Renderer) -> None:
+    """A grey sky with an even disc of irradiance 3 in it lights and shades as the grey sky and a `Light`, and
+    is mirrored once."""
+    elevation, azimuth = angles(512)
+    up, around = np.meshgrid(elevation, azimuth, indexing="ij")
+    towards = np.stack([np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)], -1)
+    to_sun = np.array((0.48, 0.6, 0.64))
+    disc = (towards @ to_sun > np.cos(0.02)) * np.cos(up) * (np.pi / 512) ** 2
+    grey = np.full((512, 1024, 3), 0.2, np.float32)
+    with_sun = grey + np.where(disc > 0, 3.0 / disc.sum(), 0.0)[..., None].astype(np.float32)
+    light = Light("sun", ZERO, tuple(-to_sun), (3.0,) * 3, 0.02, 0.0)
+    ball = lambertian(sphere(0.2), at=replace(STILL, position_m=(-0.1, 0.3, 0.2)), object_id=1)
+    metal = plain(ONE, roughness=20, family="metal")
+    mirror = Drawable(grid(0.8), Transform((0.0, -0.5, 0.3), (-48.0, 0.0, -8.4), ONE), (metal,), 2)
+    camera = Camera((-0.7, 1.4, 1.8), (0.0, 0.0, 0.2), (0.0, 0.0, 1.0), 50.0, 96, 96)
+    what = replace(view(lambertian(grid(8.0)), ball, mirror, camera=camera), sky=Sky("procedural", ONE))
+    images = []
+    for picture, lights in ((grey, (light,)), (with_sun, ())):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("fsid.render.stage.panorama", lambda sky, kept=picture: kept)
+            images.append(draw(renderer, replace(what, lights=lights)))
+    mirrored = images[0].object_id == 2
+    expected, found = (image.radiance[..., 1] for image in images)
+    bright = expected[~mirrored].max()
+    assert bright > 4 * expected[~mirrored].min()
+    assert (np.abs(found - expected)[~mirrored] < 0.01 * bright).mean() > 0.995  # all but outlines of shadows
+    assert expected[mirrored].max() > 20 * bright
+    np.testing.assert_allclose(found[mirrored].sum(), expected[mirrored].sum(), rtol=0.03)
+
+
 def test_a_sky_turns_from_x_towards_y(tmp_path) -> None:
     """Column 0 of a picture ends at +x: turned by 90 degrees it ends at +y."""
     light = np.ones((16, 32, 3), np.float32)

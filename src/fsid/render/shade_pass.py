@@ -159,5 +159,6 @@ def _set_surroundings(program: ScreenProgram, stage: Stage, shot: Shot) -> None:
         mean_sides=room.radiance.mean((1, 2)),
         room_half=room.half_m,
         room_centre=room.centre_m,
+        sunless=stage.sunless,
         sky_level=-1.0 if sky is None else max(float(np.log2(pixel_rad * len(sky) / np.pi)), 0.0),
     )

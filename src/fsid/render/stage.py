@@ -15,6 +15,7 @@ from fsid.render.layers import Layer
 from fsid.render.room import Room, light_room, light_sky
 from fsid.render.shadows import KINDS, ShadowPlan, Source, plan_shadows
 from fsid.render.sky import panorama
+from fsid.render.sky_sun import part_sun
 from fsid.scene.model import Camera, Material
 
 
@@ -22,7 +23,8 @@ from fsid.scene.model import Camera, Material
 class Stage:
     """geometry: in the world. plan: lights and their shadow maps. room: what surrounds it as a light source.
 
-    sky: (H, W, 3) radiance, None indoors. casts, glass: (N,) bool, which drawables shade others, are glass.
+    sky: (H, W, 3) radiance, None indoors; sunless: its most without the sun, which is a light.
+    casts, glass: (N,) bool, which drawables shade others, are glass.
     """
 
     view: View
@@ -30,6 +32,7 @@ class Stage:
     plan: ShadowPlan
     room: Room
     sky: np.ndarray | None
+    sunless: float
     casts: np.ndarray
     glass: np.ndarray
 
@@ -63,14 +66,18 @@ def stage_of(view: View, layers: Mapping[tuple[str, int], Layer], time_s: float,
     casts = np.array([drawable.casts for drawable in view.drawables])
     movable = np.array([_shades_outdoors(drawable, view) for drawable in view.drawables])
     sky = None if view.sky is None else panorama(view.sky)
+    sun, faint = (None, None) if sky is None else part_sun(sky)
+    if sun is not None:
+        sources.append(Source(sun))
     return Stage(
         view,
         geometry,
         plan_shadows(
             sources, geometry.spheres[casts & movable], geometry.spheres, _looked_at(view.camera), shadow_px
         ),
-        light_sky(sky) if sky is not None else _lit_room(view, sources, albedo_of),
+        light_sky(faint) if faint is not None else _lit_room(view, sources, albedo_of),
         sky,
+        0.0 if faint is None else float(faint.max()),
         casts,
         np.array([drawable.is_glass for drawable in view.drawables]),
     )

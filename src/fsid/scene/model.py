@@ -127,7 +127,8 @@ class Sky:
 
     source: "procedural" (horizon to zenith gradient, clouds of `cloudiness` drawn from `seed`, ground glow)
     or "file:PATH" of an equirectangular .hdr or .exr picture. colour: mean radiance of the upper half.
-    azimuth_deg: rotation about z. The sun itself is a `Light` of kind "sun".
+    azimuth_deg: rotation about z. The sun of a procedural sky is a `Light` of kind "sun"; a picture may have
+    its own.
     """
 
     source: str

@@ -23,6 +23,7 @@
 #endif
 layout(binding = 10) uniform sampler2D sky;   // equirectangular
 uniform float sky_level;  // mip level at which a texel of the sky is a pixel; -1 without sky
+uniform float sunless;    // what is brighter there is the sun, which is a light
 uniform vec3 vignetting;
 uniform float shining;    // 1; 0 in the image that a mirror shows, where lights have highlights instead
 
@@ -156,7 +157,8 @@ vec3 sky_at(vec3 direction) {
     vec3 d = normalize(direction);
     vec2 uv = vec2(atan(d.y, d.x) / (2.0 * PI), acos(clamp(d.z, -1.0, 1.0)) / PI);
     vec3 walls = (1.0 - shining) * mirrored(origin, d, 0.0);    // seen in a mirror where there are none
-    return sky_level < 0.0 ? walls : textureLod(sky, uv, sky_level).rgb;
+    vec3 seen_sky = textureLod(sky, uv, sky_level).rgb;
+    return sky_level < 0.0 ? walls : mix(min(seen_sky, sunless), seen_sky, shining);
 }
 
 // How the position moves on the plane of the face to the next pixel in direction of `step`.
