@@ -21,6 +21,7 @@ from PIL import Image
 from fsid.errors import FsidError
 from fsid.sensor.black_levels import BlackLevels
 from fsid.sensor.colour import published_matrices
+from fsid.sensor.defects import GAUSS_MAD
 from fsid.sensor.mosaic import check_cfa, unpack
 from fsid.sensor.quantise import MAX_DN, check_levels
 from fsid.sensor.raw import Raw
@@ -174,7 +175,8 @@ def _even(dn: np.ndarray, source: str) -> np.ndarray:
 def check_bayer(dn: np.ndarray, path: str | Path) -> None:
     """FsidError where pixels of one Bayer site differ by their place in 4x4 or 6x6 pixels.
 
-    Those of quad-Bayer, RGBW (4x4) and X-Trans (6x6) sensors do, since they have filters of other colours.
+    Those of quad-Bayer, RGBW (4x4) and X-Trans (6x6) sensors do, since they have filters of other
+    colours. Noise of whole rows and columns counts as error, or not at all where it is taken out.
     """
     for period, kinds in ((4, "quad-Bayer or RGBW"), (6, "X-Trans")):
         places = [dn[r::period, c::period] for r in range(period) for c in range(period)]
@@ -182,13 +184,30 @@ def check_bayer(dn: np.ndarray, path: str | Path) -> None:
             continue
         means = np.array([place.mean(dtype=np.float64) for place in places]).reshape(period, period)
         errors = np.array([place.std(dtype=np.float64) / np.sqrt(place.size) for place in places])
+        with_lines = float(np.hypot(errors.max(), _line_error(dn, period)))
         for r, c in np.ndindex(2, 2):
             site = means[r::2, c::2]
-            if np.ptp(site) > max(_PLACES_DIFFER * site.mean(), _SIGNIFICANT * errors.max()):
-                raise FsidError(
-                    f"{path}: looks like no Bayer mosaic but like {kinds} (a colour differs by its place in "
-                    f"{period}x{period} pixels); make a Bayer mosaic of it first"
-                )
+            unlined = site - site.mean(axis=0) - site.mean(axis=1, keepdims=True)
+            for differs, error in ((site, with_lines), (unlined, errors.max())):
+                if np.ptp(differs) > max(_PLACES_DIFFER * site.mean(), _SIGNIFICANT * error):
+                    raise FsidError(
+                        f"{path}: looks like no Bayer mosaic but like {kinds} (a colour differs by its place "
+                        f"in {period}x{period} pixels); make a Bayer mosaic of it first"
+                    )
+
+
+def _line_error(dn: np.ndarray, period: int) -> float:
+    """Standard error that noise of whole rows and columns makes of the means over every `period`-th of them.
+
+    From the steps between lines of the same filters; the median of their sizes knows no edge of the scene.
+    """
+    error2 = 0.0
+    for axis in (0, 1):
+        lines = dn.mean(axis=axis, dtype=np.float64)
+        steps = lines[period:] - lines[:-period]
+        spread = float(np.median(np.abs(steps - np.median(steps)))) / GAUSS_MAD
+        error2 += spread**2 / 2 * period / len(lines)
+    return float(np.sqrt(error2))
 
 
 def check_white(dn: np.ndarray, black_level: int, white_level: int, path: str | Path) -> None:
