@@ -210,6 +210,44 @@ def test_a_sheet_shines_to_both_sides(renderer: Renderer) -> None:
     np.testing.assert_allclose(frame.radiance[8, 8], 0.5 / np.pi * 4.0 * 0.1**2 / 2, rtol=0.02)
 
 
+EGG = (sphere(1.0, 24), (0.25, 0.05, 0.1))
+"""A mesh and its scale: an ellipsoid of half axes 25, 5 and 10 cm."""
+
+
+@pytest.mark.parametrize("height_m", [0.6, 2.0])
+@pytest.mark.parametrize(
+    ("body", "turn"),
+    [
+        (EGG, (0.0, 0.0, 0.0)),
+        (EGG, (90.0, 0.0, 0.0)),
+        (EGG, (0.0, 90.0, 0.0)),
+        ((block((0.6, 0.6, 0.02)), ONE), (0.0, 0.0, 0.0)),
+    ],
+    ids=["egg", "egg, broad side", "egg, tip", "slab"],
+)
+def test_a_shining_body_gives_as_much_as_is_seen_of_it(
+    renderer: Renderer, body: tuple[Mesh, Vec3], turn: Vec3, height_m: float
+) -> None:
+    """Right below it E is the sum over its triangles of L cos cos A / d^2, near and far."""
+    glowing = replace(plain((0.8, 0.8, 0.8)), emission=5.0)
+    mesh, scale = body
+    lamp = Drawable(mesh, Transform((0.0, 0.0, height_m), turn, scale), (glowing,), 1, specular=0.0)
+    camera = Camera((0.9, 0.0, 0.2), ZERO, (0.0, 0.0, 1.0), 0.5, 8, 8)
+    frame = draw(renderer, view(lambertian(grid(8.0)), lamp, camera=camera))
+    rotation, position = lamp.pose(0.0)
+    triangles = (mesh.vertices * np.array(scale))[mesh.faces] @ rotation.T + position
+    for _ in range(5 if len(triangles) < 100 else 0):
+        a, b, c = np.moveaxis(triangles, 1, 0)
+        ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+        four = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
+        triangles = np.concatenate([np.stack(corners, axis=1) for corners in four])
+    facets = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]) / 2
+    middle = triangles.mean(1)
+    d2 = (middle**2).sum(-1)
+    expected = 4.0 * (middle[:, 2] * np.maximum(-(middle * facets).sum(-1), 0.0) / d2**2).sum()
+    np.testing.assert_allclose(frame.radiance[4, 4] * np.pi / 0.5, expected, rtol=0.08)
+
+
 def test_the_hood_of_a_lamp_shades_its_light(renderer: Renderer) -> None:
     """A square of 0.6 m, 0.3 m below a bulb that is 1 m above the floor, shades a square of 2 m there; what
     is translucent shades nothing of its own bulb."""

@@ -1,11 +1,12 @@
 """Surfaces that shine light their neighbourhood: each becomes a light of the same power.
 
-    I = L A / 4      mean radiant intensity of a body of radiance L and convex hull A (Cauchy 1832)
+    I(u) = L / 2 sum of A_i |n_i u|,  mean L A / 4      facets A_i of the convex hull A (Cauchy 1832)
 
-placed at its centroid, as large as a sphere of that surface, and shaded by everything but itself and what
-it touches. The inside of a shade shines on itself and out of its openings, which the hull closes; of a sheet
-both sides shine. A flat one with something behind it, as the display of a screen, becomes an area light in
-its place, which shines to the front alone and is shaded by the rest of its own object, too.
+of a body of radiance L in direction u, of which sqrt(u Q u) is kept: the law of an ellipsoid, and of a flat
+sheet. It stands at the centroid, as large as a sphere of that surface, and is shaded by everything but itself
+and what it touches. The inside of a shade shines on itself and out of its openings, which the hull closes; of
+a sheet both sides shine. A flat one with something behind it, as the display of a screen, becomes an area
+light in its place, which shines to the front alone and is shaded by the rest of its own object, too.
 """
 
 from __future__ import annotations
@@ -51,7 +52,7 @@ def lamps_of(
             if part in drawable.displays:
                 source = _panel(drawable.displays[part], radiance, pose, number)
             else:
-                source = _ball(*_extent(drawable, part), radiance, pose, number)
+                source = _ball(*_body(drawable, part), radiance, pose, number)
             ahead = np.prod(source.light.size_m) if source.light.kind == "area" else 1.0
             found.append((sum(source.light.colour) * float(ahead), source))
     found.sort(key=lambda pair: -pair[0])
@@ -61,11 +62,25 @@ def lamps_of(
 _Pose = tuple[np.ndarray, np.ndarray]
 
 
-def _ball(centroid: np.ndarray, area: float, radiance: np.ndarray, pose: _Pose, number: int) -> Source:
+def _ball(centroid: np.ndarray, facets: np.ndarray, radiance: np.ndarray, pose: _Pose, number: int) -> Source:
     rotation, position = pose
+    area = _area(facets)
     radius = float(np.sqrt(area / (4 * np.pi)))
     place, intensity = vec3(rotation @ centroid + position), vec3(radiance * area / 4)
-    return Source(Light("point", place, (0.0, 0.0, -1.0), intensity, radius, 360.0), number)
+    light = Light("point", place, (0.0, 0.0, -1.0), intensity, radius, 360.0)
+    return Source(light, number, shape=rotation @ _shape(facets) @ rotation.T)
+
+
+def _shape(facets: np.ndarray) -> np.ndarray:
+    """(3, 3) Q such that sqrt(u Q u) is nearly the intensity in direction u relative to its mean."""
+    shown = np.abs(facets @ _DIRECTIONS.T).sum(0)
+    x, y, z = _DIRECTIONS.T
+    terms = np.stack([x * x, y * y, z * z, 2 * y * z, 2 * z * x, 2 * x * y], axis=-1)
+    a, b, c, d, e, f = np.linalg.lstsq(terms, (shown / max(float(shown.mean()), 1e-12)) ** 2)[0]
+    values, axes = np.linalg.eigh(np.array([[a, f, e], [f, b, d], [e, d, c]]))
+    Q = axes * np.maximum(values, 0.0) @ axes.T
+    mean = float(np.sqrt(np.einsum("ni,ij,nj->n", _DIRECTIONS, Q, _DIRECTIONS).clip(0)).mean())
+    return np.asarray(Q / max(mean, 1e-12) ** 2)
 
 
 def _panel(display: Display, radiance: np.ndarray, pose: _Pose, number: int) -> Source:
@@ -90,7 +105,8 @@ def _hood_apart(drawable: Drawable) -> list[Drawable]:
         return [drawable]
     found = {int(part): _display(drawable, part) for part in lamps}
     displays = {part: display for part, display in found.items() if display is not None}
-    balls = [_extent(drawable, part) for part in lamps if part not in displays]
+    bodies = [_body(drawable, part) for part in lamps if part not in displays]
+    balls = [(centroid, _area(facets)) for centroid, facets in bodies]
     hood = np.zeros(len(drawable.materials), bool)
     hood[parts] = [_is_hood(drawable, part, balls) for part in parts]
     if not hood.any():
@@ -101,7 +117,7 @@ def _hood_apart(drawable: Drawable) -> list[Drawable]:
 
 
 def _is_hood(drawable: Drawable, part: int, balls: Sequence[tuple[np.ndarray, float]]) -> bool:
-    """Whether a part keeps off the spheres of all lamps, as of `_extent`, and lets no light through."""
+    """Whether a part keeps off the spheres of all lamps, centroid and surface, and lets no light through."""
     if not _is_opaque(drawable.materials[part]):
         return False
     triangles = _triangles(drawable, part)
@@ -187,37 +203,45 @@ def _pieces(drawable: Drawable, wanted: np.ndarray) -> Drawable:
     return replace(drawable, mesh=pieces, materials=tuple(drawable.materials[number] for number in numbers))
 
 
-def _extent(drawable: Drawable, part: int) -> tuple[np.ndarray, float]:
-    """Centroid (3,) of a part, metres before the drawable is turned and moved, and in m^2 the surface of the
-    convex body that is seen as much of: its hull, or its own where that is less, as of several bulbs."""
+def _body(drawable: Drawable, part: int) -> tuple[np.ndarray, np.ndarray]:
+    """Centroid (3,) of a part, metres before the drawable is turned and moved, and the facets (F, 3), their
+    normals times m^2, of the convex body that is seen as much of: of its hull, or its own where these are
+    less, as of several bulbs."""
     points = _triangles(drawable, part)
-    cross = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
-    areas = np.linalg.norm(cross, axis=1) / 2
-    total = float(areas.sum())
-    closed = total + float(np.linalg.norm(cross.sum(0))) / 2  # with what closes its opening
-    hull = _hull_area(_vertices(drawable, part))
-    centroid = (points.mean(1) * areas[:, None]).sum(0) / max(total, 1e-12)
-    return centroid, hull if hull < _ROUND * closed else closed
+    own = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]) / 2
+    areas = np.linalg.norm(own, axis=1)
+    closed = np.vstack([own, -own.sum(0)])  # with what closes its opening
+    hull = _hull_facets(_vertices(drawable, part))
+    centroid = (points.mean(1) * areas[:, None]).sum(0) / max(float(areas.sum()), 1e-12)
+    is_hull = hull is not None and _area(hull) < _ROUND * _area(closed)
+    return centroid, hull if hull is not None and is_hull else closed
+
+
+def _area(facets: np.ndarray) -> float:
+    return float(np.linalg.norm(facets, axis=1).sum())
 
 
 def _vertices(drawable: Drawable, part: int) -> np.ndarray:
-    """(V, 3) metres, as `_extent`."""
+    """(V, 3) metres, as `_body`."""
     mesh = drawable.mesh
     used = np.unique(mesh.faces[mesh.face_parts == part])
     return np.asarray(mesh.vertices[used] * np.array(drawable.transform.scale, np.float32))
 
 
-def _hull_area(points: np.ndarray) -> float:
-    """m^2, of the points (V, 3) that lie farthest in fixed directions; infinite where these are flat."""
+def _hull_facets(points: np.ndarray) -> np.ndarray | None:
+    """(F, 3), as `_body`, of the points (V, 3) that lie farthest in fixed directions; None where these are
+    flat."""
     corners = np.unique((points @ _DIRECTIONS.T).argmax(0))
     try:
-        return float(ConvexHull(points[corners]).area)
+        hull = ConvexHull(points[corners])
     except QhullError:
-        return np.inf
+        return None
+    a, b, c = np.moveaxis(points[corners][hull.simplices], 1, 0)
+    return np.asarray(np.cross(b - a, c - a) / 2)
 
 
 def _triangles(drawable: Drawable, part: int) -> np.ndarray:
-    """(F, 3, 3) metres, as `_extent`."""
+    """(F, 3, 3) metres, as `_body`."""
     mesh = drawable.mesh
     return np.asarray(mesh.vertices[mesh.faces[mesh.face_parts == part]] * np.array(drawable.transform.scale))
 

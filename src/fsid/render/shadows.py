@@ -34,6 +34,9 @@ _COARSEST_PX = 64
 KINDS = dict(zip(LIGHT_KINDS, (0, 0, 1, 2), strict=True))
 _WIDEST_SPOT_DEG = 120.0
 _WIDEST_BORDER = 0.7
+_SHAPED = -3.0
+"""In place of the cosine of a cone: a lamp that has a shape, as in shaders/lights.glsl."""
+
 _NEAR_CELLS = 2
 """Side of the sun's nearer tile, in other tiles."""
 
@@ -64,7 +67,7 @@ LIGHT = np.dtype(
     ]
 )
 """Eight texels of `struct Light` in shaders/lights.glsl; for half_width, half_height of the sun see
-`_fill_nearer`."""
+`_fill_nearer`, of a lamp `_fill_shape`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,11 +75,13 @@ class Source:
     """A light, and the number of the drawable (-1: none) that is the lamp itself and casts no shadow.
 
     axes: half width and half height (3,) of an area light that does not lie as `half_axes` has it.
+    shape: (3, 3) Q of a point light whose intensity in direction u is sqrt(u Q u) times its colour.
     """
 
     light: Light
     lamp: int = -1
     axes: tuple[np.ndarray, np.ndarray] | None = None
+    shape: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,6 +272,16 @@ def _fill(
         row["radius_m"] = 0.5 * float(np.hypot(*light.size_m))
     if len(fields) == 2:
         _fill_nearer(row, *fields)
+    if source.shape is not None:
+        _fill_shape(row, source.shape)
+
+
+def _fill_shape(row: np.void, Q: np.ndarray) -> None:
+    """The six numbers of the symmetric Q and the root of its determinant, marked by a cosine that no cone
+    has."""
+    row["cos_outer"], row["cos_inner"] = _SHAPED, np.sqrt(max(float(np.linalg.det(Q)), 0.0))
+    row["half_width"][:3] = np.diag(Q)
+    row["half_height"][:3] = Q[1, 2], Q[2, 0], Q[0, 1]
 
 
 def _fill_nearer(row: np.void, whole: _Field, nearer: _Field) -> None:

@@ -6,6 +6,7 @@ uniform int light_count;
 
 const int LIGHT_TEXELS = 8;
 const int POINT = 0, SUN = 1, AREA = 2;
+const float SHAPED = -3.0;    // fsid.render.shadows
 const float PI = 3.14159265;
 
 struct Light {
@@ -19,6 +20,7 @@ struct Light {
     int kind, first_tile, tile_count;
     float range_m;           // of the sun's tile
     vec3 half_width, half_height;   // of an area light; of the sun where its nearer tile is, see _fill_nearer
+                                    // of a lamp its shape, see _fill_shape
 };
 
 Light light_at(int i) {
@@ -28,12 +30,18 @@ Light light_at(int i) {
                  int(t[5].x), int(t[5].y), int(t[5].z), t[5].w, t[6].xyz, t[7].xyz);
 }
 
-// Irradiance at normal incidence of a point, spot or sun, without shadow; to_light is unit.
+// Irradiance at normal incidence of a point, spot or sun, without shadow; to_light is unit. A lamp of a shape is an
+// ellipsoid: along an axis of half length c, where it shows the disc of radius a, I / (d^2 + a^2 - c^2) is exact.
 vec3 arriving(Light light, vec3 to_light, float distance_m) {
-    float reach = light.kind == SUN ? 1.0 : max(distance_m, light.radius_m);
-    float cone = light.cos_outer < -1.0 ? 1.0
+    float reach = light.kind == SUN ? 1.0 : max(distance_m, light.radius_m), reach2 = reach * reach;
+    vec3 l = to_light;
+    float squared = max(dot(light.half_width, l * l) + 2.0 * dot(light.half_height, l.yzx * l.zxy), 0.0);
+    float shown = sqrt(squared), disc = light.radius_m * light.radius_m * shown;
+    float nearer = light.radius_m * light.radius_m * light.cos_inner / max(squared, 1e-3);
+    bool shaped = light.cos_outer < SHAPED + 0.5;
+    float share = shaped ? shown : light.cos_outer < -1.0 ? 1.0
         : smoothstep(light.cos_outer, light.cos_inner, dot(light.direction, -to_light));
-    return light.colour * (cone / (reach * reach));
+    return light.colour * (share / (shaped ? max(distance_m * distance_m + disc - nearer, disc) : reach2));
 }
 
 // Angle between unit vectors over its sine, from their cosine in 0..1: within 7e-7 (tools/fit_arc.py).
