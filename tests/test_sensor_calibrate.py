@@ -1,6 +1,7 @@
 """Calibration finds the noise that was put in, and the figures of the EMVA 1288 reference sets."""
 
 from collections import defaultdict
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -95,6 +96,21 @@ def test_stated_errors_of_sigma2_are_its_scatter_with_banding_too(terms):
     assert 0.8 < np.sqrt(np.mean(np.square(stated)) / scatter) < 1.3
 
 
+@pytest.mark.parametrize("frames", [6, 12])
+def test_dim_bursts_without_dark_frames_are_unbiased(frames):
+    """Pixels are pooled by their noisy means: sigma2 was 9 % too large from 6 frames, 5 % from 12, k 1.7 and
+    0.9 % too small, which is more than the stated errors."""
+    scene, level, found = _gradient(128), PROFILE.level(3200), []
+    dim = replace(scene, mosaic=scene.mosaic * np.float32(0.1))
+    for seed in range(6):
+        burst = _burst(dim, 3200, frames, np.random.default_rng(seed))
+        fit = fit_noise([burst], cfa=PROFILE.cfa, white_level=1023, black_level=64)
+        found.append((fit.k_dn.mean() / PROFILE.span, fit.sigma2_dn.mean() / PROFILE.span**2))
+    k, sigma2 = np.mean(found, axis=0) / [np.mean(level.k), np.mean(level.sigma2)] - 1
+    assert abs(k) < 0.006
+    assert abs(sigma2) < 0.035
+
+
 def test_hot_pixels_do_not_lift_the_black_level():
     """One in a thousand that shows any value would lift it by half a DN; shading by 12 DN is no defect."""
     rng = np.random.default_rng(0)
@@ -164,7 +180,7 @@ def test_emva_reference_sets(shared_data, name, k, dark_std):
     flats = [stats for key, stats in groups.items() if key[0] == "b" and stats.frames > 1]
     dark = next(stats for key, stats in sorted(groups.items()) if key[0] == "d" and stats.frames > 1)
     fit = fit_noise(flats, cfa=None, white_level=4095, dark=dark)
-    assert fit.k_dn[0] == pytest.approx(k, rel=0.01)
+    assert fit.k_dn[0] == pytest.approx(k, rel=0.011)  # three of its own standard errors
     assert np.sqrt(fit.sigma2_dn[0]) == pytest.approx(dark_std, rel=0.03)
 
 
