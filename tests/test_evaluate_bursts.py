@@ -13,7 +13,7 @@ from scipy.ndimage import gaussian_filter, shift
 from fsid.cli.main import main
 from fsid.errors import FsidError
 from fsid.evaluate import NOISY, burst_testset, compare, psnr, read_testset, simulated_testset
-from fsid.evaluate.bursts import average
+from fsid.evaluate.burst_truth import average
 from fsid.evaluate.placing import shift_between
 from fsid.sensor import NoiseLevel, NoiseTerms, Raw, load_profile, noisy_from_clean, read_raw, write_dng
 from fsid.sensor.metadata import ORIENTATION, Metadata, exposure_metadata

@@ -16,7 +16,7 @@ from fsid.cli.tables import print_table
 from fsid.errors import FsidError
 
 if TYPE_CHECKING:
-    from fsid.evaluate.bursts import TruthQuality
+    from fsid.evaluate.burst_truth import TruthQuality
 
 DEFAULT_ISOS = (800, 1600, 3200, 6400)
 

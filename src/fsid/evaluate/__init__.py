@@ -4,7 +4,8 @@
 (`model_method`, `evaluate_models`) needs it when it is loaded; the rest runs without it.
 """
 
-from fsid.evaluate.bursts import TruthQuality, burst_testset
+from fsid.evaluate.burst_truth import TruthQuality
+from fsid.evaluate.bursts import burst_testset
 from fsid.evaluate.classical import denoise_classical
 from fsid.evaluate.compare import CLASSICAL, NOISY, Comparison, Method, Row, compare, write_results
 from fsid.evaluate.metrics import psnr, ssim
