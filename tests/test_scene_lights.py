@@ -251,6 +251,16 @@ def test_the_sun_is_redder_the_lower_it_stands():
     assert redness[0] > 2 * redness[-1]
 
 
+def test_a_picture_of_the_sky_gets_no_second_sun(tmp_path: Path):
+    """Its own shines as a light; all of the light that is drawn comes from it and the sky around it."""
+    (tmp_path / "noon.hdr").write_bytes(_radiance_header(64, 32))
+    lights = LightConfig(sun_share=1.0, night_share=0.0, irradiance=(2.0, 2.0), adaptation=(0.0, 0.0))
+    for seed in range(3):
+        s = scene(seed, background=OUTSIDE, lights=lights, hdri_folder=str(tmp_path), hdri_share=1.0)
+        assert s.lights == ()
+        assert np.array(s.sky.colour) @ LUMINANCE == pytest.approx(2.0 / np.pi)
+
+
 def test_the_sky_at_night_gives_three_tenths_of_what_surroundings_do():
     night = LightConfig(
         night_share=1.0, irradiance=(2.0, 2.0), ambient_share=(1.5, 1.5), adaptation=(0.0, 0.0)

@@ -150,8 +150,8 @@ def _temperature_rand(rng: np.random.Generator, limits_k: tuple[float, float]) -
 def _daylight_rand(
     rng: np.random.Generator, config: LightConfig, irradiance: float, source: str
 ) -> tuple[list[Light], Sky]:
-    """The sun, if it shines, and the sky that shares the irradiance with it."""
-    sunny = rng.random() < config.sun_share
+    """The sun, if it shines, and the sky that shares the irradiance with it; a picture has one or none."""
+    sunny = rng.random() < config.sun_share and source == "procedural"
     height_deg = float(np.degrees(np.arcsin(rng.uniform(0.1, 0.97))))
     azimuth_deg = float(rng.uniform(0, 360))
     sun_k = float(np.interp(height_deg, (5, 40), (3000, 5600)))
