@@ -150,7 +150,7 @@ def _check_alike(path: Path, raw: Raw, first: Raw) -> None:
         stated.append(("exposure time in s", ours_s, theirs_s))
     for what, ours, theirs in stated:
         if ours != theirs:
-            ours, theirs = (f"{v:.4g}" if isinstance(v, float) else v for v in (ours, theirs))
+            ours, theirs = (f"{v:.6g}" if isinstance(v, float) else v for v in (ours, theirs))
             raise FsidError(
                 f"{path}: {what} {ours} differs from {theirs} of the burst's first frame; "
                 f"a burst is of one camera in one setting"
