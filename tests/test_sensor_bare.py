@@ -151,6 +151,11 @@ def test_mosaics_of_other_filters_are_no_bayer_mosaics(tmp_path, rng, filters, w
             read_mosaic(tmp_path / "a.npy", **CAMERA)
 
 
+@pytest.mark.parametrize("shape", [(4, 2000), (6, 3000), (2000, 4)])
+def test_strips_too_narrow_to_tell_filters_are_taken(shape):
+    check_bayer(np.random.default_rng(0).integers(90, 110, shape, dtype=np.uint16), "a.npy")
+
+
 @pytest.mark.parametrize("light", [0.0, 100.0])
 def test_noise_of_rows_and_columns_is_no_other_filter(light):
     """Small and dark Bayer mosaics of strong banding were refused in seven of eight cases; with light, other

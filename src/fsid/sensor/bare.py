@@ -180,7 +180,7 @@ def check_bayer(dn: np.ndarray, path: str | Path) -> None:
     """
     for period, kinds in ((4, "quad-Bayer or RGBW"), (6, "X-Trans")):
         places = [dn[r::period, c::period] for r in range(period) for c in range(period)]
-        if min(place.size for place in places) < _LEAST_PIXELS:
+        if min(place.size for place in places) < _LEAST_PIXELS or min(dn.shape) < 2 * period:
             continue
         means = np.array([place.mean(dtype=np.float64) for place in places]).reshape(period, period)
         errors = np.array([place.std(dtype=np.float64) / np.sqrt(place.size) for place in places])
