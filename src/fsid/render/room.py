@@ -29,11 +29,10 @@ from fsid.render.sky import angles
 from fsid.scene.colour import LUMINANCE
 from fsid.scene.model import Light, Vec3
 
-GRID = 16
+GRID, FINE_GRID = 16, 64
 _AMONG_THINGS = 0.25
-"""Height at which the ambient light of a room is taken, relative to its own: most stand on its floor."""
+"""Height, relative to the room's, at which its ambient light is taken: things stand on the floor."""
 
-SKY_GRID = 64
 SKY_HALF_M = 1e5
 _PEAK = 10.0
 """Radiance relative to the mean from which on nothing of a sky may be missed."""
@@ -76,26 +75,26 @@ def light_room(
 def light_sky(panorama: np.ndarray) -> Room:
     """panorama: (H, 2 H, 3) as `fsid.render.sky.panorama`."""
     half = np.full(3, SKY_HALF_M)
-    directions = np.stack([_grid(half, np.zeros(3), side, SKY_GRID)[0] for side in range(6)]) / SKY_HALF_M
+    directions = np.stack([_grid(half, np.zeros(3), side, FINE_GRID)[0] for side in range(6)]) / SKY_HALF_M
     coarse = panorama
-    while len(coarse) > 2 * SKY_GRID and len(coarse) % 2 == 0:
+    while len(coarse) > 2 * FINE_GRID and len(coarse) % 2 == 0:
         coarse = (coarse[::2] + coarse[1::2]) / 2
         coarse = (coarse[:, ::2] + coarse[:, 1::2]) / 2
     norm = np.linalg.norm(directions, axis=-1)
     unit_direction = directions / norm[..., None]
     most = np.float32(_PEAK) * panorama.mean()
     radiance = look_up(np.minimum(coarse, most), unit_direction)
-    _add_peaks(radiance, panorama, most, (2 / SKY_GRID) ** 2 / norm**3)
+    _add_peaks(radiance, panorama, most, (2 / FINE_GRID) ** 2 / norm**3)
     shares = _shares(np.ones(3), np.zeros(3))
     return Room(half, np.zeros(3), np.einsum("asij,sijc->ac", shares, radiance), radiance)
 
 
 def _shares(half: np.ndarray, eye: np.ndarray) -> np.ndarray:
-    """(6, 6, SKY_GRID, SKY_GRID): of the irradiance towards each axis, what comes from each cell of each side
-    of a box that is as bright everywhere. eye: (3,) metres beside its middle."""
-    weight = np.empty((6, 6, SKY_GRID, SKY_GRID))
+    """(6, 6, FINE_GRID, FINE_GRID): of the irradiance towards each axis, what comes from each cell of each
+    side of a box that is as bright everywhere. eye: (3,) metres beside its middle."""
+    weight = np.empty((6, 6, FINE_GRID, FINE_GRID))
     for side in range(6):
-        points, inward = _grid(half, -eye, side, SKY_GRID)
+        points, inward = _grid(half, -eye, side, FINE_GRID)
         cell = half.prod() / half[side // 2]
         weight[:, side] = np.maximum(_AXES @ points[..., None], 0.0)[..., 0].transpose(2, 0, 1)
         weight[:, side] *= -cell * (points @ inward) / (points**2).sum(-1) ** 2
@@ -114,7 +113,7 @@ def _add_peaks(radiance: np.ndarray, panorama: np.ndarray, most: float, solid_an
     axis, each = np.abs(direction).argmax(0), np.arange(len(texel))
     along = direction[axis, each]
     at = [direction[(axis + i) % 3, each] / np.abs(along) for i in (2, 1)]
-    cells = [((0.5 + 0.5 * x) * SKY_GRID).astype(int).clip(0, SKY_GRID - 1) for x in at]
+    cells = [((0.5 + 0.5 * x) * FINE_GRID).astype(int).clip(0, FINE_GRID - 1) for x in at]
     place = (2 * axis + (along < 0), *cells)
     np.add.at(radiance, (*place, colour), power / solid_angle[place])
 
