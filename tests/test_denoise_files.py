@@ -193,6 +193,31 @@ def test_noise_beyond_networks_is_said(
         assert capsys.readouterr().err == ""
 
 
+def test_noise_that_the_image_contradicts_is_said(
+    tmp_path: Path, network: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "in"
+    folder.mkdir()
+    for name, times in (("a", 1), ("b", 2), ("c", 0.1), ("d", 10), ("e", 0.05)):
+        level = PROFILE.level(3200)
+        stated = NoiseLevel(*(tuple(times * value for value in values) for values in (level.k, level.sigma2)))
+        write_dng(folder / f"{name}.dng", replace(noisy_raw(), noise=stated))
+    main(["denoise", str(folder), str(tmp_path / "out"), "--model", str(network)])
+    said = capsys.readouterr().err
+    assert (
+        "c.dng and 1 more: shows 10 times the noise variance of the file's NoiseProfile; the result" in said
+    )
+    assert "d.dng: shows 0.10 times" in said
+    for name, told in (("a", ""), ("b", ""), ("c", "may be noisy"), ("d", "d.dng: shows 0.10 times")):
+        main(["denoise", str(folder / f"{name}.dng"), str(tmp_path / "one.dng"), "--model", str(network)])
+        said = capsys.readouterr().err
+        assert ("note:" in said) == bool(told)
+        assert told in said
+    wrong = ["--model", str(network), "--profile", "galaxy-s22", "--iso", "100"]
+    main(["denoise", str(folder / "a.dng"), str(tmp_path / "one.dng"), *wrong])
+    assert "times the noise variance of profile galaxy-s22 at ISO 100" in capsys.readouterr().err
+
+
 def test_a_noise_profile_of_zeros_is_none(
     tmp_path: Path, network: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -16,7 +16,7 @@ from fsid.sensor import (
     load_profile,
     noisy_from_clean,
 )
-from fsid.sensor.blind import _HIGH, _Blocks, _line, _Pools, _pools
+from fsid.sensor.blind import _HIGH, _Blocks, _line, _Pools, _pools, contradiction
 
 PROFILE = load_profile("pixel6")
 
@@ -124,3 +124,25 @@ def test_a_site_that_shows_nothing_has_the_errors_of_texture_and_of_other_sites(
     noisy.mosaic[::2, ::2] = 1
     found = estimate_noise(noisy)
     assert found.k_error[0] / found.level.k[0] == pytest.approx(np.hypot(0.08, 0.1), rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("times", "told"), [(1.0, False), (2.5, False), (0.4, False), (8.0, True), (0.1, True)]
+)
+def test_a_stated_noise_that_is_another_is_contradicted(times, told, rng):
+    clean, level = clean_from_photo(rng, photo(), PROFILE), PROFILE.level(3200)
+    noisy = noisy_from_clean(rng, clean, 3200, level)
+    stated = NoiseLevel(tuple(k / times for k in level.k), tuple(s / times for s in level.sigma2))
+    found = contradiction(noisy, stated)
+    assert (found is not None) == told
+    if found is not None:
+        assert found == pytest.approx(times, rel=0.1)
+
+
+def test_an_image_without_noise_contradicts_what_states_some():
+    flat = scene(np.repeat(np.linspace(0.1, 0.8, 8), 32)[None].repeat(256, 0))
+    level = PROFILE.level(3200)
+    assert contradiction(flat, level) == 0
+    assert contradiction(flat, NoiseLevel((0.0,) * 4, (0.0,) * 4)) is None
+    floor = 1 / 12 / (1023 - 64) ** 2
+    assert contradiction(flat, NoiseLevel((0.0,) * 4, (2 * floor,) * 4)) is None

@@ -113,6 +113,7 @@ def denoise(
         finally:  # what is to be said of those that are done does not depend on the others
             _note_guessed(noises, quiet=quiet)
             _note_strong(noises, quiet=quiet)
+            _note_unlike(noises, quiet=quiet)
         return
     with progress_bar("denoising", "tiles", quiet=quiet) as progress:
         noise = denoise_file(
@@ -131,6 +132,7 @@ def denoise(
         line = f"noise: {noise.source}, k = {k:.3g}, sigma2 = {sigma2:.3g}"
         console.print(Text(line), soft_wrap=True)
     _note_strong({input: noise}, quiet=quiet)
+    _note_unlike({input: noise}, quiet=quiet)
 
 
 def _note(line: str, *, quiet: bool = False) -> None:
@@ -181,6 +183,23 @@ def _note_strong(noises: Mapping[Path, Noise], *, quiet: bool) -> None:
             f"(variance at mid-grey above {MAX_TOLD:g}); look at the result"
         )
         _note(line, quiet=quiet)
+
+
+def _note_unlike(noises: Mapping[Path, Noise], *, quiet: bool) -> None:
+    """A line on the files that show far more noise than was taken off, one on those with far less."""
+    shown = [(path, noise, noise.shown) for path, noise in noises.items() if noise.shown is not None]
+    for unlike, result in (
+        ([found for found in shown if found[2] > 1], "noisy"),
+        ([found for found in shown if found[2] < 1], "too smooth"),
+    ):
+        if unlike:
+            path, noise, times = unlike[0]
+            others = f" and {len(unlike) - 1} more" if len(unlike) > 1 else ""
+            line = (
+                f"{path}{others}: shows {times:.{0 if times > 1 else 2}f} times the noise variance of "
+                f"{noise.source}; the result may be {result}"
+            )
+            _note(line, quiet=quiet)
 
 
 def _note_left_out(folder: Path, output: Path, *, bare: bool) -> None:

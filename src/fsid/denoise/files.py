@@ -26,7 +26,7 @@ from fsid.sensor import (
     write_dng,
 )
 from fsid.sensor.bare import BARE_SUFFIXES, HEADERLESS_SUFFIXES
-from fsid.sensor.blind import stated_noise
+from fsid.sensor.blind import contradiction, stated_noise
 
 RAW_SUFFIXES = frozenset(
     """.3fr .arw .cr2 .cr3 .crw .dcr .dng .erf .fff .iiq .k25 .kdc .mef .mos .mrw .nef .nrw .orf .pef .raf
@@ -38,11 +38,14 @@ _SMALLEST_PX = 22  # LibRaw takes no smaller image for a RAW
 
 @dataclass(frozen=True)
 class Noise:
-    """A noise level, and in words where it came from. is_estimated: from the image itself."""
+    """A noise level, and in words where it came from. is_estimated: from the image itself. shown: variance
+    that the image shows over that of the level, where it contradicts it (`fsid.sensor.blind.contradiction`).
+    """
 
     level: NoiseLevel
     source: str
     is_estimated: bool = False
+    shown: float | None = None
 
 
 def find_raws(folder: str | Path, *, bare: bool = False) -> list[Path]:
@@ -176,7 +179,7 @@ def denoise_file(
     except FsidError as error:
         raise FsidError(f"{source}: {error}") from None
     write_dng(target, clean_levels(clean), preview_of(clean))
-    return noise
+    return noise if noise.is_estimated else replace(noise, shown=contradiction(raw, noise.level))
 
 
 def target_in(folder: Path, source: Path) -> Path:

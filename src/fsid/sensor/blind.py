@@ -16,6 +16,7 @@ smoothest are taken. Texture as fine and random as noise (grain, gravel, grass) 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,6 +29,7 @@ from fsid.sensor.mosaic import site_offsets
 from fsid.sensor.quantise import ROUNDING_DN2
 from fsid.sensor.raw import NoiseLevel, Raw, four
 
+UNLIKE = 4.0  # times a variance: two stops of ISO, beyond what texture makes in photographs
 SITE_SPREAD = (0.1, 0.3)  # relative, of k and sigma2: twelve published phones
 LINEAR_SHARE = 0.9  # of the range; brighter blocks are near saturation
 _SIDE = 8
@@ -42,6 +44,10 @@ _ROUNDS = 8
 _SMOOTH_QUANTILE = 0.5
 _REWEIGHTINGS = 12
 _TEXTURE = 0.08  # of a variance: error that texture makes in an ordinary photograph (bench/blind_noise.py)
+
+
+class NoiselessError(FsidError):
+    """The smooth parts of an image hold no noise beyond its rounding."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +68,28 @@ def stated_noise(raw: Raw) -> NoiseLevel | None:
     if min(stated) < 0:
         raise FsidError("its NoiseProfile holds a variance below 0")
     return raw.noise
+
+
+def contradiction(raw: Raw, level: NoiseLevel) -> float | None:
+    """Variance that `raw` shows over that of `level`, both in the mean light of the image, where it is above
+    `UNLIKE` or below its inverse by two standard errors; None where it is not, or the image does not tell."""
+    light = [float(raw.mosaic[r::2, c::2].clip(0, 1).mean()) for r, c in site_offsets(raw.cfa)]
+    floor = ROUNDING_DN2 / (raw.white_level - raw.black_level) ** 2
+    stated = max(_in_light(level.k, level.sigma2, light), floor)
+    try:
+        shown = estimate_noise(raw)
+    except NoiselessError:
+        return 0.0 if stated > UNLIKE * floor else None
+    except FsidError:
+        return None
+    times = _in_light(shown.level.k, shown.level.sigma2, light) / stated
+    error = _in_light(shown.k_error, shown.sigma2_error, light) / stated
+    return times if times - 2 * error > UNLIKE or times + 2 * error < 1 / UNLIKE else None
+
+
+def _in_light(k: Sequence[float], sigma2: Sequence[float], light: Sequence[float]) -> float:
+    """Mean over the sites of k x + sigma2; of errors it is the most that they can be."""
+    return sum(a * x + b for a, b, x in zip(k, sigma2, light, strict=True)) / 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +138,7 @@ def estimate_noise(raw: Raw) -> NoiseEstimate:
         pools = _pools(together, line)
         line, errors = _line(pools, floor)
     if line[0] == 0 and line[1] <= floor:
-        raise FsidError("the image holds no noise beyond its rounding; there is nothing to measure")
+        raise NoiselessError("the image holds no noise beyond its rounding; there is nothing to measure")
     if np.all(errors > line):
         raise FsidError("the image does not tell its noise: too few smooth parts, or all of one brightness")
     errors = np.hypot(
