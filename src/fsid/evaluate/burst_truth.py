@@ -8,7 +8,7 @@ g_f is the flicker of the light, o_f the drift of the black level; a frame that 
 the shift is a whole number of CFA tiles (`placing`), and left out where it is not, since interpolating would
 blur the truth. By what is left, less than a sixth of a tile or hidden by noise, the first frame lies beside
 the truth, which is blurred by it: the third part of the error (`beside`). The light that noise has where DN 0
-cuts it off is taken out (`cut_off`).
+or the white level cuts it off is taken out (`cut_off`).
 """
 
 from __future__ import annotations
@@ -113,15 +113,26 @@ def _trimmed_mean(placed: Sequence[Placed], window: Window, first: Raw, lowest: 
     off = Departure.of(change)
     others, gains = [departure.less(off) for departure in departures], [p.gain for p in placed]
     beside = Departure.of((first.mosaic - mean - change).clip(-reach, reach))
-    span = first.white_level - first.black_level
-    dn, near_dn2 = span * (mean + change - lowest), span**2 * _mean_of_site(spread)
-    light_dn, slope = before_cut_off(dn, _mean_of_site(dn), near_dn2)
+    truth, slope = _uncut(mean + change, spread, lowest, first.white_level - first.black_level)
     return _Mean(
-        truth=(lowest + light_dn / span).astype(np.float32),
+        truth=truth.astype(np.float32),
         outliers=float(1 - used.mean() / len(placed)),
         noise2=float(np.mean(slope**2 * spread / np.maximum(used, 1))),
         beside2=beside2(beside, others, gains, unlike),
     )
+
+
+def _uncut(
+    mean: np.ndarray, variance: np.ndarray, lowest: np.ndarray, span: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """(light without what DN 0 and white cut off of its noise, d light / d mean), (H, W) both; from mean and
+    variance over frames. The slope is 0 where light is above white, which PSNR does not know."""
+    near_dn2 = span**2 * _mean_of_site(variance)
+    up_dn, down_dn = span * (mean - lowest), span * (1 - mean)
+    light_dn, slope = before_cut_off(up_dn, _mean_of_site(up_dn), near_dn2)
+    shade_dn, slope_at_white = before_cut_off(down_dn, _mean_of_site(down_dn), near_dn2)
+    light = mean + (light_dn - up_dn - shade_dn + down_dn) / span
+    return light, slope * np.where(shade_dn < 0, 0, slope_at_white)
 
 
 def _of_dn_0(path: Path) -> np.ndarray:

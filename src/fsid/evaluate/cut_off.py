@@ -1,9 +1,9 @@
-"""The light of pixels whose noise the camera cuts off at DN 0.
+"""The light of pixels whose noise the camera cuts off: at DN 0, and counted down from it at the white level.
 
     m = E max(y, 0) = tau (u Phi(u) + phi(u)),      v = Var max(y, 0),      y ~ N(u tau, tau^2)
 
-Where the black level is less than a few sigma above DN 0, the mean over frames is too bright, however many
-there are. v / m^2 falls as u rises: mean and variance of a neighbourhood tell its u, and with it tau (a
+Less than a few sigma above DN 0 the mean over frames is too bright, however many there are (below white too
+dark). v / m^2 falls as u rises: mean and variance of a neighbourhood tell its u, and with it tau (a
 censored normal distribution, Tobin 1958); its tau and the mean of a pixel tell that pixel's own u. Rounding
 adds 1/12 DN^2 to the variance of what is not cut off; it hides noise below one DN, which is left as it is.
 """
@@ -16,8 +16,8 @@ from scipy.special import ndtr
 from fsid.sensor.quantise import ROUNDING_DN2
 
 _LEAST_TAU_DN = 1.0
-_REACH = 4.5  # sigmas above DN 0, from which on no noise is cut off
-_U = np.linspace(-1.0, 8.0, 1801)  # light is never below black, and its mean by chance by less than that
+_REACH = 4.5  # sigmas from the limit, from which on no noise is cut off
+_U = np.linspace(-1.0, 8.0, 1801)  # light is never below black; how far it is above white nothing shows
 _SHARE = ndtr(_U)  # that is not cut off
 _MEAN = _U * _SHARE + np.exp(-_U * _U / 2) / np.sqrt(2 * np.pi)
 _RATIO = (_U * _MEAN + _SHARE) / _MEAN**2 - 1  # of the variance to the squared mean
@@ -27,7 +27,8 @@ _PASSES = 3
 def before_cut_off(
     dn: np.ndarray, near_dn: np.ndarray, near_dn2: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(mu of every pixel in DN, d mu / d mean) from its mean over frames `dn`, all (H, W), counted from DN 0.
+    """(mu of every pixel in DN, d mu / d mean) from its mean over frames `dn`, all (H, W), counted up from
+    DN 0, or down from white.
 
     near_dn, near_dn2: mean and variance over frames of a pixel's neighbourhood. mu may lie below 0.
     """
