@@ -20,9 +20,11 @@ from fsid.cli.main import main  # noqa: E402
 from fsid.config import to_plain  # noqa: E402
 from fsid.denoise import Denoiser, ModelCard, NetworkConfig, RawDenoiser, denoise_raw, save_model  # noqa: E402
 from fsid.denoise.export import export  # noqa: E402
+from fsid.denoise.model import load_denoiser  # noqa: E402
 from fsid.denoise.onnx_denoiser import OnnxDenoiser, load_onnx, onnx_denoiser  # noqa: E402
 from fsid.denoise.onnx_export import onnx_bytes, onnx_model  # noqa: E402
-from fsid.denoise.quality import probes  # noqa: E402
+from fsid.denoise.onnx_int8 import eight_bit  # noqa: E402
+from fsid.denoise.quality import CALIBRATED, mean_psnr, probes  # noqa: E402
 from fsid.errors import FsidError  # noqa: E402
 from fsid.sensor import NoiseLevel, Raw, load_profile, read_raw, write_dng  # noqa: E402
 
@@ -171,7 +173,7 @@ def test_the_command_writes_a_smaller_form_and_denoise_runs_it(
 ) -> None:
     few = probes(("coffee.png",))[:1]
     monkeypatch.setattr("fsid.denoise.export.probes", lambda: few)
-    monkeypatch.setattr("fsid.denoise.onnx_int8.probes", lambda names: few)
+    monkeypatch.setattr("fsid.denoise.onnx_int8.probes", lambda names, isos: few)
     save_model(tmp_path / "model.safetensors", denoiser.net.state_dict(), denoiser.card)
     small = tmp_path / "small.ONNX"  # what kind it is does not hang on its letters
     main(["export", str(tmp_path / "model.safetensors"), str(small), "--precision", "int8"])
@@ -200,6 +202,16 @@ def test_the_command_writes_a_smaller_form_and_denoise_runs_it(
     expected = denoise_raw(read_raw(tmp_path / "noisy.dng"), denoiser).mosaic
     got = read_raw(tmp_path / "clean.dng").mosaic
     assert np.corrcoef(got.ravel(), expected.clip(max=1).ravel())[0, 1] > 0.98
+
+
+def test_eight_bits_keep_colours_and_detail_in_noise_of_any_strength(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("fsid.denoise.onnx_int8.CALIBRATED", CALIBRATED[:1])
+    shipped = load_denoiser()
+    small = onnx_denoiser(eight_bit(onnx_model(shipped)).SerializeToString(), "small")
+    for probe in probes(("coffee.png",), (100, 3200, 51200, 64000)):
+        assert mean_psnr(shipped, [probe]) - mean_psnr(small, [probe]) < 0.3
+        mean, small_mean = (denoise_raw(probe.noisy, n).mosaic.mean(dtype=float) for n in (shipped, small))
+        assert small_mean == pytest.approx(mean, rel=0.005)
 
 
 def test_half_precision_stays_near(rng: np.random.Generator, denoiser: Denoiser) -> None:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from fsid.denoise.onnx_denoiser import inputs
-from fsid.denoise.quality import CALIBRATED, probes
+from fsid.denoise.quality import CALIBRATED, CALIBRATED_ISOS, probes
 from fsid.sensor import pack
 
 _CALIBRATION_TILE = 128
@@ -71,7 +71,7 @@ def _reader(base: type) -> Any:
 
 
 def _feeds() -> Iterator[dict[str, np.ndarray]]:
-    for probe in probes(CALIBRATED):
+    for probe in probes(CALIBRATED, CALIBRATED_ISOS):
         raw = probe.noisy
         assert raw.noise is not None
         packed = pack(raw.mosaic, raw.cfa)[:, :_CALIBRATION_TILE, :_CALIBRATION_TILE]
