@@ -2,6 +2,7 @@
 
 import io
 import os
+import struct
 from dataclasses import replace
 
 import numpy as np
@@ -274,6 +275,49 @@ def test_black_levels_and_crop_count_from_the_active_area(tmp_path, top, left):
     write_dng(tmp_path / "b.dng", back)
     with tifffile.TiffFile(tmp_path / "b.dng") as file:
         assert tuple(file.pages.first.tags[50719].value) == (2, 2)
+
+
+def opcodes(*each):
+    """(number, parameters as uint32) of each, as an OpcodeList of a DNG holds them."""
+    whole = [struct.pack(f">4I{len(p)}I", number, 0x01030000, 1, 4 * len(p), *p) for number, p in each]
+    return struct.pack(">I", len(each)) + b"".join(whole)
+
+
+BAD = ((9, 20), (10, 21), (20, 30), (20, 32))  # of the stored pixels; the last two are neighbours of a site
+CALLED_BAD = {
+    "one value": (4, (7, 0)),
+    "places": (5, (0, 5, 0, *np.ravel(BAD), 900, 900)),
+    "rectangles": (5, (0, 2, 3, 20, 30, 20, 32, 9, 20, 10, 21, 10, 21, 11, 22, 0, 0, 3, 5)),
+}
+
+
+@pytest.mark.parametrize("is_linearized", [False, True])
+@pytest.mark.parametrize("called", CALLED_BAD)
+def test_pixels_that_a_dng_calls_bad_are_made_of_those_around_them(tmp_path, called, is_linearized):
+    """A ramp stays one; the list counts from the first pixel stored, and its values are those stored."""
+    row, column = np.mgrid[:40, :48]
+    dn = (100 + 2 * row + 4 * column).astype(np.uint16)
+    area, level = (50829, "I", 4, (3, 5, 37, 45)), (50714, "I", 1, 64)
+    tags = [area, level]
+    if is_linearized:
+        tags.append((50712, "H", 1024, tuple(range(1, 1025))))
+    write_with_black(tmp_path / "good.dng", dn, *tags)
+    expected = read_raw(tmp_path / "good.dng").mosaic
+    dn[tuple(np.transpose(BAD))] = 7
+    listed = opcodes((1, (1, 2, 3)), CALLED_BAD[called])
+    write_with_black(tmp_path / "bad.dng", dn, *tags, (51008, "B", len(listed), listed))
+    found = read_raw(tmp_path / "bad.dng").mosaic
+    np.testing.assert_allclose(found, expected, atol=2.7 / (1023 - 64))  # neighbours see more of one side
+    lone = tuple(np.transpose(BAD[:2]) - [[3], [5]])
+    np.testing.assert_allclose(found[lone], expected[lone], atol=1e-5)
+    assert np.sum(found != expected) <= len(BAD)
+
+
+@pytest.mark.parametrize("broken", [b"", b"\0\0\0\1\0", opcodes((5, (0, 9, 9, 1)), (4, (7,)))[:-2]])
+def test_a_broken_list_of_bad_pixels_says_nothing(tmp_path, broken):
+    dn = np.full((32, 40), 70, np.uint16)
+    write_with_black(tmp_path / "a.dng", dn, (50714, "I", 1, 64), (51008, "B", len(broken), broken))
+    np.testing.assert_allclose(read_raw(tmp_path / "a.dng").mosaic, 6 / (1023 - 64), rtol=1e-5)
 
 
 def test_a_dng_without_an_active_area_is_read_whole_whatever_its_camera(tmp_path):

@@ -36,7 +36,7 @@ def libraw(pattern: np.ndarray | None = BAYER, **said) -> SimpleNamespace:
         "camera_whitebalance": [0.0] * 4,
         "daylight_whitebalance": [0.0] * 4,
         "rgb_xyz_matrix": np.zeros((4, 3), np.float32),
-        "sizes": SimpleNamespace(flip=0),
+        "sizes": SimpleNamespace(flip=0, top_margin=0, left_margin=0),
     }
     return SimpleNamespace(**{**silent, **said})
 
@@ -77,7 +77,7 @@ def test_what_libraw_says_of_an_exposure_reaches_the_rewritten_file(opened, tmp_
         libraw(
             other=other,
             lens=lens,
-            sizes=SimpleNamespace(flip=6),
+            sizes=SimpleNamespace(flip=6, top_margin=0, left_margin=0),
             camera_whitebalance=[2048.0, 1024.0, 1536.0, 1024.0],
             rgb_xyz_matrix=matrix,
         )

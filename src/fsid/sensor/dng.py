@@ -21,6 +21,7 @@ import rawpy
 from fsid.errors import FsidError
 from fsid.files import write_atomically
 from fsid.sensor import dng_tags
+from fsid.sensor.bad_pixels import bad_pixels, mended
 from fsid.sensor.bare import BARE_SUFFIXES
 from fsid.sensor.black_levels import BlackLevels
 from fsid.sensor.colour import is_of_camera, published_matrices
@@ -111,8 +112,9 @@ def read_raw(path: str | Path | BinaryIO) -> Raw:
     path: or a binary file, read from its start, such as io.BytesIO of what a shard holds.
 
     Black levels that differ between sites (in a DNG in any pattern, between rows and columns too, and by
-    fractions of a DN) are subtracted each; `black_level` is their rounded mean. Unknown colour becomes the
-    mean of the published matrices, unknown white balance (1, 1, 1), unknown ISO 0.
+    fractions of a DN) are subtracted each; `black_level` is their rounded mean. Pixels that a DNG calls bad
+    are made of those around them. Unknown colour becomes the mean of the published matrices, unknown white
+    balance (1, 1, 1), unknown ISO 0.
     FsidError: missing, truncated, zeros in place of pixels, no RAW, a bare mosaic, not Bayer (X-Trans,
     Foveon, linear DNG, monochrome), floating point, black levels or colours that cannot be.
     """
@@ -123,9 +125,11 @@ def read_raw(path: str | Path | BinaryIO) -> Raw:
 
 @dataclass(frozen=True, eq=False)
 class Stored:
-    """What a RAW file holds. dn: (H, W) uint16, H and W even. cfa: of its first pixel. black: of each."""
+    """What a RAW file holds. dn: (H, W) uint16, H and W even. first: (row, column) of its first pixel among
+    all that are stored. cfa: of that pixel. black: of each."""
 
     dn: np.ndarray
+    first: tuple[int, int]
     cfa: str
     black: BlackLevels
     white_level: int
@@ -252,8 +256,9 @@ def _from_libraw(file: rawpy.RawPy, source: _Source, path: Path) -> Raw:
     tags = source.values
     stored = _stored(file, tags, path)
     metadata = source.metadata or libraw_metadata(file)
+    mosaic = stored.black.normalised(stored.dn, stored.black_level, stored.white_level)
     return Raw(
-        mosaic=stored.black.normalised(stored.dn, stored.black_level, stored.white_level),
+        mosaic=mended(mosaic, _bad_pixels(stored, tags)),
         cfa=stored.cfa,
         black_level=stored.black_level,
         white_level=stored.white_level,
@@ -266,9 +271,15 @@ def _from_libraw(file: rawpy.RawPy, source: _Source, path: Path) -> Raw:
     )
 
 
+def _bad_pixels(stored: Stored, tags: dict[int, Values]) -> np.ndarray:
+    """(H, W) bool: which pixels a DNG calls bad."""
+    opcodes = dng_tags.opcodes_of_stored(tags)
+    return bad_pixels(opcodes, stored.dn, stored.first, dng_tags.linearization(tags))
+
+
 def _stored(file: rawpy.RawPy, tags: dict[int, Values], path: Path) -> Stored:
     """The pixels are in LibRaw's memory."""
-    dn, colours = _visible(file, _pattern(file, path), tags)
+    dn, colours, first = _visible(file, _pattern(file, path), tags)
     cfa = _cfa(file, colours, path)
     black = _black_levels(file, colours, tags, dn.shape, path)
     dn = dn[: dn.shape[0] - dn.shape[0] % 2, : dn.shape[1] - dn.shape[1] % 2]
@@ -277,13 +288,13 @@ def _stored(file: rawpy.RawPy, tags: dict[int, Values], path: Path) -> Stored:
     level, white = black.mean(), int(file.white_level)
     if not (math.isfinite(level) and 0 <= round(level) < white):
         raise FsidError(f"{path}: black level {level:g} is not below white level {white}")
-    return Stored(dn, cfa, black, white)
+    return Stored(dn, first, cfa, black, white)
 
 
 def _visible(
     file: rawpy.RawPy, pattern: np.ndarray, tags: dict[int, Values]
-) -> tuple[np.ndarray, np.ndarray]:
-    """The image without its masked margins, and LibRaw's colours of its first 2x2 pixels.
+) -> tuple[np.ndarray, np.ndarray, tuple[int, int]]:
+    """The image without its masked margins, LibRaw's colours of its first 2x2 pixels, and where it begins.
 
     LibRaw starts at even pixels, and cuts rows off for some cameras; what a DNG says of pixels counts from
     where its ActiveArea starts.
@@ -294,8 +305,10 @@ def _visible(
         top, left, bottom, right = area
         moved = max(abs(file.sizes.top_margin - top), abs(file.sizes.left_margin - left))
         if moved <= 1 and bottom <= height and right <= width:
-            return file.raw_image[top:bottom, left:right], np.roll(pattern, (-top, -left), axis=(0, 1))
-    return file.raw_image_visible, file.raw_colors_visible[:2, :2]
+            colours = np.roll(pattern, (-top, -left), axis=(0, 1))
+            return file.raw_image[top:bottom, left:right], colours, (top, left)
+    first = file.sizes.top_margin, file.sizes.left_margin
+    return file.raw_image_visible, file.raw_colors_visible[:2, :2], first
 
 
 def _black_levels(

@@ -48,7 +48,7 @@ EXIF_ISO = 34855
 DNG_VERSION, DNG_BACKWARD_VERSION, UNIQUE_CAMERA_MODEL = 50706, 50707, 50708
 CFA_PLANE_COLOUR, CFA_LAYOUT, BLACK_REPEAT, BLACK_LEVEL, WHITE_LEVEL = 50710, 50711, 50713, 50714, 50717
 COLOUR_MATRIX_1, COLOUR_MATRIX_2, AS_SHOT_NEUTRAL, PRIVATE_DATA = 50721, 50722, 50728, 50740
-LINEARIZATION, BLACK_DELTA_H, BLACK_DELTA_V = 50712, 50715, 50716
+LINEARIZATION, BLACK_DELTA_H, BLACK_DELTA_V, OPCODES_1 = 50712, 50715, 50716, 51008
 ILLUMINANT_1, ILLUMINANT_2, NOISE_PROFILE, ACTIVE_AREA = 50778, 50779, 51041, 50829
 
 D65 = 21  # EXIF LightSource
@@ -213,6 +213,18 @@ def black_deltas(tags: Tags, code: int, length: int) -> np.ndarray:
     the black level; 0 where `tags` state another number of them."""
     deltas = _numbers(tags, code)
     return np.array(deltas) if len(deltas) == length else np.zeros(length)
+
+
+def opcodes_of_stored(tags: Tags) -> bytes:
+    """A DNG's OpcodeList1, b"" where there is none."""
+    opcodes = tags.get(OPCODES_1, b"") if DNG_VERSION in tags else b""
+    return opcodes if isinstance(opcodes, bytes) else b""
+
+
+def linearization(tags: Tags) -> np.ndarray | None:
+    """The DN that a DNG's stored integers stand for; None where they stand for themselves."""
+    table = _numbers(tags, LINEARIZATION) if DNG_VERSION in tags else ()
+    return np.array(table) if table else None
 
 
 def d65_matrix(tags: Tags) -> np.ndarray | None:
