@@ -218,6 +218,26 @@ def test_noise_that_the_image_contradicts_is_said(
     assert "times the noise variance of profile galaxy-s22 at ISO 100" in capsys.readouterr().err
 
 
+def test_a_denoised_file_says_so_and_is_not_smoothed_again_without_a_word(
+    tmp_path: Path, noisy_file: Path, network: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """NoiseReductionApplied of DNG: at 1 a converter removes no more by itself."""
+    once, half, again = (tmp_path / f"{name}.dng" for name in ("once", "half", "again"))
+    options = ["--model", str(network), "--profile", "galaxy-s22"]
+    for source, out, strength, stated in (
+        (noisy_file, half, "0.5", 0.5),
+        (half, once, "2", 1.0),
+        (once, again, "0.25", 1.0),
+    ):
+        main(["denoise", str(source), str(out), "--strength", strength, *options])
+        assert ("once.dng: denoised before" in capsys.readouterr().err) == (source == once)
+        assert read_raw(out).metadata.noise_removed == stated
+        with tifffile.TiffFile(out) as dng:
+            (mosaic,) = dng.pages[0].pages
+            assert mosaic.tags[50935].value == {0.5: (1, 2), 1.0: (1, 1)}[stated]
+    assert read_raw(noisy_file).metadata.noise_removed == 0
+
+
 def test_a_noise_profile_of_zeros_is_none(
     tmp_path: Path, network: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -114,6 +114,7 @@ def denoise(
             _note_guessed(noises, quiet=quiet)
             _note_strong(noises, quiet=quiet)
             _note_unlike(noises, quiet=quiet)
+            _note_left(noises, quiet=quiet)
         return
     with progress_bar("denoising", "tiles", quiet=quiet) as progress:
         noise = denoise_file(
@@ -133,6 +134,7 @@ def denoise(
         console.print(Text(line), soft_wrap=True)
     _note_strong({input: noise}, quiet=quiet)
     _note_unlike({input: noise}, quiet=quiet)
+    _note_left({input: noise}, quiet=quiet)
 
 
 def _note(line: str, *, quiet: bool = False) -> None:
@@ -200,6 +202,17 @@ def _note_unlike(noises: Mapping[Path, Noise], *, quiet: bool) -> None:
                 f"{noise.source}; the result may be {result}"
             )
             _note(line, quiet=quiet)
+
+
+def _note_left(noises: Mapping[Path, Noise], *, quiet: bool) -> None:
+    """A line on the files that were denoised before."""
+    if left := [path for path, noise in noises.items() if noise.is_left]:
+        others = f" and {len(left) - 1} more" if len(left) > 1 else ""
+        line = (
+            f"{left[0]}{others}: denoised before, as NoiseReductionApplied says; "
+            "what is smoothed now may be detail"
+        )
+        _note(line, quiet=quiet)
 
 
 def _note_left_out(folder: Path, output: Path, *, bare: bool) -> None:

@@ -68,7 +68,8 @@ def denoise_raw(
     tile_px: int = TILE_PX,
     progress: Progress | None = None,
 ) -> Raw:
-    """The clean estimate of `raw`, all metadata kept, `noise` None (what is left no longer follows the law).
+    """The clean estimate of `raw`, `noise` None (what is left no longer follows the law), all metadata kept;
+    they state that it is denoised.
 
     level: noise of `raw`; None takes `raw.noise`. strength: 0..1 is the share of the noise's amplitude that
     is removed, so that grain is left below 1; above 1 the noise is taken to be that many times as strong, up
@@ -98,7 +99,7 @@ def denoise_raw(
     if strength < 1:
         mosaic *= np.float32(strength)
         mosaic += np.float32(1 - strength) * raw.mosaic
-    return replace(raw, mosaic=mosaic, noise=None)
+    return replace(raw, mosaic=mosaic, noise=None, metadata=raw.metadata.with_noise_removed(min(strength, 1)))
 
 
 def is_beyond_networks(level: NoiseLevel) -> bool:

@@ -38,13 +38,15 @@ _SMALLEST_PX = 22  # LibRaw takes no smaller image for a RAW
 
 @dataclass(frozen=True)
 class Noise:
-    """A noise level, and in words where it came from. is_estimated: from the image itself. shown: variance
-    that the image shows over that of the level, where it contradicts it (`fsid.sensor.blind.contradiction`).
+    """A noise level, and in words where it came from. is_estimated: from the image itself. is_left: what was
+    left by a denoiser that removed all noise, as the file states. shown: else, variance that the image shows
+    over that of a level that it contradicts (`fsid.sensor.blind.contradiction`).
     """
 
     level: NoiseLevel
     source: str
     is_estimated: bool = False
+    is_left: bool = False
     shown: float | None = None
 
 
@@ -179,7 +181,9 @@ def denoise_file(
     except FsidError as error:
         raise FsidError(f"{source}: {error}") from None
     write_dng(target, clean_levels(clean), preview_of(clean))
-    return noise if noise.is_estimated else replace(noise, shown=contradiction(raw, noise.level))
+    is_left = raw.metadata.noise_removed >= 1
+    known = noise.is_estimated or is_left
+    return replace(noise, is_left=is_left, shown=None if known else contradiction(raw, noise.level))
 
 
 def target_in(folder: Path, source: Path) -> Path:

@@ -18,7 +18,7 @@ from fsid.sensor.tiff import ASCII, RATIONAL, SHORT, Tag, rationals
 
 ORIENTATION, EXPOSURE_TIME, F_NUMBER, FOCAL_LENGTH, LENS_MODEL = 274, 33434, 33437, 37386, 42036
 DATE_TAKEN = 36867
-CROP_ORIGIN, CROP_SIZE = 50719, 50720
+CROP_ORIGIN, CROP_SIZE, NOISE_REMOVED = 50719, 50720, 50935
 COLOUR_MATRICES = frozenset((*range(50721, 50728), 50778, 50779, 50964, 50965))  # and their analog balance
 
 # Description, make, model, orientation, date, artist, copyright; DNG: camera, colour, lens, profile.
@@ -26,7 +26,9 @@ _FIRST = frozenset((270, 271, 272, ORIENTATION, 306, 315, 33432, 50707, 50708, 5
 _FIRST |= frozenset((50730, 50731, 50732, 50734, 50735, 50736, 50739, 50931, 50932))
 _FIRST |= frozenset((*range(50936, 50943), 50981, 50982, 51107, 51108, 51109, 51110))
 # Crop, green split, chroma blur, anti-alias, scale; lens corrections that converters apply to linear data.
-_MOSAIC = frozenset((CROP_ORIGIN, CROP_SIZE, 50718, 50733, 50737, 50738, 50780, 51009, 51022, 51125))
+_MOSAIC = frozenset(
+    (CROP_ORIGIN, CROP_SIZE, NOISE_REMOVED, 50718, 50733, 50737, 50738, 50780, 51009, 51022, 51125)
+)
 _GEOMETRY = frozenset((CROP_ORIGIN, CROP_SIZE, 51009, 51022, 51125))
 _EXIF = frozenset((EXPOSURE_TIME, F_NUMBER, 34850, 34855, 34864, 34865, 34866, 34867, 36864, 36867, 36868))
 _EXIF |= frozenset((*range(37377, 37387), 37510, 37520, 37521, 37522, 41985, 41986, 41987, 41989, 41990))
@@ -53,6 +55,19 @@ class Metadata:
     def exposure_s(self) -> float:
         """Exposure time in seconds; 0 where nothing is said."""
         return next((value for tag in self.exif if tag.code == EXPOSURE_TIME for value in _numbers(tag)), 0.0)
+
+    @property
+    def noise_removed(self) -> float:
+        """Share of the noise that was removed from the pixels (NoiseReductionApplied); 0 where nothing is
+        said."""
+        return next(
+            (value for tag in self.mosaic if tag.code == NOISE_REMOVED for value in _numbers(tag)), 0.0
+        )
+
+    def with_noise_removed(self, share: float) -> Metadata:
+        """The same for an image that was denoised, so that converters need not smooth it once more."""
+        removed = Tag(NOISE_REMOVED, RATIONAL, rationals([max(share, self.noise_removed)]))
+        return replace(self, mosaic=(*(t for t in self.mosaic if t.code != NOISE_REMOVED), removed))
 
     def within(self, width: int, height: int) -> Metadata:
         """The same for an image of that many pixels: a crop that reaches beyond them ends there."""
