@@ -139,6 +139,20 @@ def test_strength(network: Path) -> None:
             denoise_raw(raw, model, strength=wrong)
 
 
+@pytest.mark.parametrize("strength", [0.5, 1, 2])
+def test_saturated_light_stays_at_the_white_level(strength: float) -> None:
+    """As in the DNG. Far above saturation pixels have no noise."""
+    light = np.full((64, 96), 0.3, np.float32)
+    light[:, 48:] = 2.5
+    clean = Raw(light, PROFILE.cfa, 64, 1023, (2, 1, 1.6), PROFILE.xyz_to_camera[0])
+    noisy = noisy_from_clean(np.random.default_rng(0), clean, 3200, PROFILE.level(3200))
+    mosaic = denoise_raw(noisy, load_model("nafnet-small"), strength=strength).mosaic
+    assert mosaic.max() == 1
+    assert mosaic[:, 64:].mean(dtype=float) == pytest.approx(1, abs=1e-3)
+    noisy.mosaic[10, 10] = 1.2  # where a file states less than its sensor holds, that is no less true
+    assert denoise_raw(noisy, load_model("nafnet-small")).mosaic.max() > 1
+
+
 @pytest.mark.parametrize("strength", [8, 20, 100])
 def test_the_strongest_smoothing_keeps_the_colours(strength: float) -> None:
     rng = np.random.default_rng(0)

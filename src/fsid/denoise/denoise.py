@@ -69,7 +69,8 @@ def denoise_raw(
     progress: Progress | None = None,
 ) -> Raw:
     """The clean estimate of `raw`, `noise` None (what is left no longer follows the law), all metadata kept;
-    they state that it is denoised.
+    they state that it is denoised. Nothing is brighter than saturation, or than the brightest pixel of `raw`:
+    what saturates has no noise, which no training shows, and of it networks make some percent more.
 
     level: noise of `raw`; None takes `raw.noise`. strength: 0..1 is the share of the noise's amplitude that
     is removed, so that grain is left below 1; above 1 the noise is taken to be that many times as strong, up
@@ -96,6 +97,7 @@ def denoise_raw(
         return _denoise_mosaic(mosaic, cfa, model, level, tile_px, told)
 
     mosaic = self_ensemble(raw.mosaic, raw.cfa, level, ensemble, denoised)
+    np.minimum(mosaic, max(1.0, float(raw.mosaic.max())), out=mosaic)
     if strength < 1:
         mosaic *= np.float32(strength)
         mosaic += np.float32(1 - strength) * raw.mosaic
