@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -12,6 +12,7 @@ from rich.text import Text
 from tyro.conf import Positional
 
 from fsid.cli.arguments import Ensemble, black_levels
+from fsid.cli.denoise_notes import note, note_guessed, note_left_out, note_noises, note_other_frames
 from fsid.cli.iso_notes import note_extrapolation, note_files
 from fsid.cli.progress import progress_bar
 from fsid.errors import FsidError
@@ -80,7 +81,7 @@ def denoise(
         raise FsidError("--skip-existing: is for a folder of files; leave it out")
     if layout is not None:
         _check_layout(layout, sources or [input])
-        _note_other_frames(layout, profile, quiet=quiet)
+        note_other_frames(layout, profile, quiet=quiet)
     network = load_model(model, backend)
     check_options(profile, iso, strength, layout)
     console = Terminal(stderr=True)
@@ -90,9 +91,9 @@ def denoise(
         note_files(profile, sources or [input], quiet=quiet)
     if sources is not None:
         if not quiet:
-            _note_left_out(input, output, bare=layout is not None)
+            note_left_out(input, output, bare=layout is not None)
         if skip_existing and (made := [path for path in sources if target_in(output, path).is_file()]):
-            _note(f"{len(made)} of {len(sources)} files are in {output} already and left alone", quiet=quiet)
+            note(f"{len(made)} of {len(sources)} files are in {output} already and left alone", quiet=quiet)
         noises: dict[Path, Noise] = {}
         try:
             with progress_bar("denoising", "files", quiet=quiet) as progress:
@@ -111,10 +112,8 @@ def denoise(
                     failed=lambda error: console.print(error_line(error), soft_wrap=True),
                 )
         finally:  # what is to be said of those that are done does not depend on the others
-            _note_guessed(noises, quiet=quiet)
-            _note_strong(noises, quiet=quiet)
-            _note_unlike(noises, quiet=quiet)
-            _note_left(noises, quiet=quiet)
+            note_guessed(noises, quiet=quiet)
+            note_noises(noises, quiet=quiet)
         return
     with progress_bar("denoising", "tiles", quiet=quiet) as progress:
         noise = denoise_file(
@@ -132,102 +131,7 @@ def denoise(
         k, sigma2 = (sum(values) / 4 for values in (noise.level.k, noise.level.sigma2))
         line = f"noise: {noise.source}, k = {k:.3g}, sigma2 = {sigma2:.3g}"
         console.print(Text(line), soft_wrap=True)
-    _note_strong({input: noise}, quiet=quiet)
-    _note_unlike({input: noise}, quiet=quiet)
-    _note_left({input: noise}, quiet=quiet)
-
-
-def _note(line: str, *, quiet: bool = False) -> None:
-    Terminal(stderr=True, quiet=quiet).print(Text(f"note: {line}"), soft_wrap=True)
-
-
-def _note_other_frames(layout: Layout, profile: str | None, *, quiet: bool) -> None:
-    """Lines where what is stated is not what the frames had from which the camera was calibrated."""
-    from fsid.sensor import load_bayer_profile
-    from fsid.sensor.camera_fit import SITES_APART_DN
-
-    camera = None if profile is None else load_bayer_profile(profile)
-    if camera is None or camera.measured is None or layout.black_level is None:
-        return
-    measured = f"profile {profile} was measured on frames of"
-    if layout.cfa != camera.cfa:
-        line = f"--cfa {layout.cfa}: {measured} {camera.cfa}; of such a frame red and blue go wrong"
-        _note(line, quiet=quiet)
-    if layout.white_level != camera.white_level:
-        line = f"--white-level {layout.white_level}: {measured} {camera.white_level}"
-        _note(f"{line}; of such a frame the noise is taken for another than it is", quiet=quiet)
-        return
-    black = camera.measured.black.mean(axis=0)
-    if np.abs(black - np.asarray(layout.black_level)).max() > SITES_APART_DN:
-        levels = ",".join(f"{level:.4g}" for level in black)
-        line = f"without --black-level {levels}, as profile {profile} measured, a cast stays"
-        _note(line, quiet=quiet)
-
-
-def _note_guessed(noises: Mapping[Path, Noise], *, quiet: bool) -> None:
-    """A line on the files whose noise nothing states."""
-    if guessed := [path for path, noise in noises.items() if noise.is_estimated]:
-        line = (
-            f"the noise of {len(guessed)} of {len(noises)} files, the first one {guessed[0]}, is "
-            "estimated from the images; --profile and --iso state it"
-        )
-        _note(line, quiet=quiet)
-
-
-def _note_strong(noises: Mapping[Path, Noise], *, quiet: bool) -> None:
-    """A line on the files that hold more noise than networks keep colours in."""
-    from fsid.denoise.denoise import MAX_TOLD, is_beyond_networks
-
-    if strong := [path for path, noise in noises.items() if is_beyond_networks(noise.level)]:
-        others = f" and {len(strong) - 1} more" if len(strong) > 1 else ""
-        line = (
-            f"{strong[0]}{others}: more noise than networks keep all colours in "
-            f"(variance at mid-grey above {MAX_TOLD:g}); look at the result"
-        )
-        _note(line, quiet=quiet)
-
-
-def _note_unlike(noises: Mapping[Path, Noise], *, quiet: bool) -> None:
-    """A line on the files that show far more noise than was taken off, one on those with far less."""
-    shown = [(path, noise, noise.shown) for path, noise in noises.items() if noise.shown is not None]
-    for unlike, result in (
-        ([found for found in shown if found[2] > 1], "noisy"),
-        ([found for found in shown if found[2] < 1], "too smooth"),
-    ):
-        if unlike:
-            path, noise, times = unlike[0]
-            others = f" and {len(unlike) - 1} more" if len(unlike) > 1 else ""
-            line = (
-                f"{path}{others}: shows {times:.{0 if times > 1 else 2}f} times the noise variance of "
-                f"{noise.source}; the result may be {result}"
-            )
-            _note(line, quiet=quiet)
-
-
-def _note_left(noises: Mapping[Path, Noise], *, quiet: bool) -> None:
-    """A line on the files that were denoised before."""
-    if left := [path for path, noise in noises.items() if noise.is_left]:
-        others = f" and {len(left) - 1} more" if len(left) > 1 else ""
-        line = (
-            f"{left[0]}{others}: denoised before, as NoiseReductionApplied says; "
-            "what is smoothed now may be detail"
-        )
-        _note(line, quiet=quiet)
-
-
-def _note_left_out(folder: Path, output: Path, *, bare: bool) -> None:
-    """A line on the files in subfolders (an `output` among them holds results), one on the other kind's."""
-    from fsid.denoise.files import raws_below, raws_inside
-
-    below = [p for p in raws_below(folder, bare=bare) if output.resolve() not in p.resolve().parents]
-    others = raws_inside(folder, bare=not bare)
-    kind = f"RAW files in {folder}" if bare else f"files in {folder} that may be bare mosaics"
-    how = f"denoise them {'without' if bare else 'with'} --cfa, --black-level and --white-level"
-    inside, each = f"files in folders inside {folder}", "give each folder by itself"
-    for what, left_out, advice in ((inside, below, each), (kind, others, how)):
-        if left_out:
-            line = f"{what} are left out ({len(left_out)}, the first one {left_out[0]}); {advice}"
-            _note(line)
+    note_noises({input: noise}, quiet=quiet)
 
 
 def _check_layout(layout: Layout, paths: Sequence[Path]) -> None:

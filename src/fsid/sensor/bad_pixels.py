@@ -17,6 +17,7 @@ from fsid.sensor.defects import TILE
 
 _CONSTANT, _LIST = 4, 5
 _MAX_OPCODES = 1 << 10
+_MAX_RECTANGLES = 1 << 12  # more than any sensor has; a broken list may hold millions
 _REACH = 32  # pixels of a site from the nearest good one: of a cluster, a column or a small rectangle
 _AROUND = np.array([[0.5, 1, 0.5], [1, 0, 1], [0.5, 1, 0.5]], np.float32)
 """Of the pixels of a site; those at the corners are farther."""
@@ -40,7 +41,7 @@ def bad_pixels(
             found |= dn == value
         elif number == _LIST and len(data) >= 12:
             _, points, rectangles = struct.unpack(">3I", data[:12])
-            if len(data) != 12 + 8 * points + 16 * rectangles:
+            if len(data) != 12 + 8 * points + 16 * rectangles or rectangles > _MAX_RECTANGLES:
                 continue
             places = np.frombuffer(data, ">u4", 2 * points, 12).astype(np.int64).reshape(-1, 2) - first
             rows, columns = places[np.all((places >= 0) & (places < dn.shape), axis=1)].T

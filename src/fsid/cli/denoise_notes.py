@@ -1,0 +1,98 @@
+"""What fsid denoise says of files beside its results, each in one line."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from rich.text import Text
+
+from fsid.terminal import Terminal
+
+if TYPE_CHECKING:
+    from fsid.denoise import Noise
+    from fsid.sensor import Layout
+
+
+def note(line: str, *, quiet: bool = False) -> None:
+    Terminal(stderr=True, quiet=quiet).print(Text(f"note: {line}"), soft_wrap=True)
+
+
+def note_other_frames(layout: Layout, profile: str | None, *, quiet: bool) -> None:
+    """Lines where what is stated is not what the frames had from which the camera was calibrated."""
+    from fsid.sensor import load_bayer_profile
+    from fsid.sensor.camera_fit import SITES_APART_DN
+
+    camera = None if profile is None else load_bayer_profile(profile)
+    if camera is None or camera.measured is None or layout.black_level is None:
+        return
+    measured = f"profile {profile} was measured on frames of"
+    if layout.cfa != camera.cfa:
+        line = f"--cfa {layout.cfa}: {measured} {camera.cfa}; of such a frame red and blue go wrong"
+        note(line, quiet=quiet)
+    if layout.white_level != camera.white_level:
+        line = f"--white-level {layout.white_level}: {measured} {camera.white_level}"
+        note(f"{line}; of such a frame the noise is taken for another than it is", quiet=quiet)
+        return
+    black = camera.measured.black.mean(axis=0)
+    if np.abs(black - np.asarray(layout.black_level)).max() > SITES_APART_DN:
+        levels = ",".join(f"{level:.4g}" for level in black)
+        line = f"without --black-level {levels}, as profile {profile} measured, a cast stays"
+        note(line, quiet=quiet)
+
+
+def note_guessed(noises: Mapping[Path, Noise], *, quiet: bool) -> None:
+    """A line on the files whose noise nothing states."""
+    if guessed := [path for path, noise in noises.items() if noise.is_estimated]:
+        line = (
+            f"the noise of {len(guessed)} of {len(noises)} files, the first one {guessed[0]}, is "
+            "estimated from the images; --profile and --iso state it"
+        )
+        note(line, quiet=quiet)
+
+
+def note_noises(noises: Mapping[Path, Noise], *, quiet: bool) -> None:
+    """Lines on the files that may not be denoised as they should be: those that hold more noise than networks
+    keep colours in, that were denoised before, that show far more noise than was taken off, or far less."""
+    from fsid.denoise.denoise import MAX_TOLD, is_beyond_networks
+
+    if strong := [path for path, noise in noises.items() if is_beyond_networks(noise.level)]:
+        line = (
+            f"{_named(strong)}: more noise than networks keep all colours in "
+            f"(variance at mid-grey above {MAX_TOLD:g}); look at the result"
+        )
+        note(line, quiet=quiet)
+    if left := [path for path, noise in noises.items() if noise.is_left]:
+        said = "denoised before, as NoiseReductionApplied says; what is smoothed now may be detail"
+        note(f"{_named(left)}: {said}", quiet=quiet)
+    shown = {path: noise.shown for path, noise in noises.items() if noise.shown is not None}
+    for result, digits, unlike in (
+        ("noisy", 0, [path for path, times in shown.items() if times > 1]),
+        ("too smooth", 2, [path for path, times in shown.items() if times < 1]),
+    ):
+        if unlike:
+            times, source = f"{shown[unlike[0]]:.{digits}f}", noises[unlike[0]].source
+            line = f"{_named(unlike)}: shows {times} times the noise variance of {source}"
+            note(f"{line}; the result may be {result}", quiet=quiet)
+
+
+def _named(paths: Sequence[Path]) -> str:
+    """The first of `paths`, and how many there are beside it."""
+    return f"{paths[0]} and {len(paths) - 1} more" if len(paths) > 1 else str(paths[0])
+
+
+def note_left_out(folder: Path, output: Path, *, bare: bool) -> None:
+    """A line on the files in subfolders (an `output` among them holds results), one on the other kind's."""
+    from fsid.denoise.files import raws_below, raws_inside
+
+    below = [p for p in raws_below(folder, bare=bare) if output.resolve() not in p.resolve().parents]
+    others = raws_inside(folder, bare=not bare)
+    kind = f"RAW files in {folder}" if bare else f"files in {folder} that may be bare mosaics"
+    how = f"denoise them {'without' if bare else 'with'} --cfa, --black-level and --white-level"
+    inside, each = f"files in folders inside {folder}", "give each folder by itself"
+    for what, left_out, advice in ((inside, below, each), (kind, others, how)):
+        if left_out:
+            line = f"{what} are left out ({len(left_out)}, the first one {left_out[0]}); {advice}"
+            note(line)
