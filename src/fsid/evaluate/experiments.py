@@ -57,7 +57,7 @@ from fsid.evaluate.experiment_report import write_experiment_report
 from fsid.evaluate.known import known_note
 from fsid.evaluate.models import model_method
 from fsid.evaluate.simulated import LUXES, simulated_testset
-from fsid.evaluate.testset import levels_of, photo_testset, read_testset
+from fsid.evaluate.testset import Setting, levels_of, photo_testset, read_testset
 from fsid.files import make_folder, read_whole
 from fsid.scene import VARIANTS
 from fsid.sensor import load_bayer_profile
@@ -127,7 +127,6 @@ def _check(out: Path, config: ExperimentConfig, bar: ProgressBar, workers: int) 
     Its folder is taken once it has begun: the corrected command would be another experiment. Until then every
     photograph is decoded, to see that it can be.
     """
-    levels_of(load_bayer_profile(config.camera), TEST_ISOS, LUXES)
     _training(config, config.seeds[0])
     for source in SOURCES[config.kind]:
         _generator(out, config, source)
@@ -151,23 +150,39 @@ def _known(config: ExperimentConfig, workers: int) -> str:
 
 
 def _check_noise(out: Path, config: ExperimentConfig) -> None:
-    """A run of an older FSID drew other noise than the camera's, and no two rivals may differ in that."""
-    profiles = _training(config, config.seeds[0]).profiles
+    """A run of an older FSID drew other noise, and no two rivals may differ in that."""
+    noise = _noise(_training(config, config.seeds[0]))
     for file in sorted((out / "runs").glob("*/config.yaml")):
-        begun = load_settings(TrainConfig, file).profiles
-        if begun != profiles:
+        begun = _noise(load_settings(TrainConfig, file))
+        if begun != noise:
             raise FsidError(
-                f"{file}: was trained on the noise of {', '.join(begun)}, and the others would be on that of "
-                f"{', '.join(profiles)}; use another folder"
+                f"{file}: was trained on the noise of {begun}, and the others would be on that of {noise}; "
+                "use another folder"
             )
 
 
+def _noise(training: TrainConfig) -> str:
+    return f"{', '.join(training.profiles)} at ISO {training.iso_min:g} to {training.iso_max:g}"
+
+
 def _training(config: ExperimentConfig, seed: int) -> TrainConfig:
+    """On the noise of the camera, at least from the lowest to the highest ISO that is tested."""
+    usual = train_config(config.network)
+    isos = [setting.iso for setting in _levels(config).values()]
+    noise: list[Override] = [
+        ("profiles", [config.camera]),
+        ("iso_min", min(usual.iso_min, *isos)),
+        ("iso_max", max(usual.iso_max, *isos)),
+    ]
     steps = [f"steps={config.steps}"] if config.steps else []
-    noise: list[Override] = [("profiles", [config.camera])]
     training = train_config(config.network, [*noise, f"seed={seed}", *config.train_settings, *steps])
     # scenes and photographs differ in size, and their trainings must not
     return training if training.shrink else replace(training, shrink=(1,))
+
+
+def _levels(config: ExperimentConfig) -> dict[str, Setting]:
+    """The levels of all test sets."""
+    return levels_of(load_bayer_profile(config.camera), TEST_ISOS, LUXES)
 
 
 def _count(config: ExperimentConfig, source: str) -> int:
