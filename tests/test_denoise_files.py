@@ -22,6 +22,7 @@ import fsid  # noqa: E402
 from fsid.cli.main import main  # noqa: E402
 from fsid.denoise import ModelCard, NetworkConfig, RawDenoiser, denoise_raw, load_model, save_model  # noqa: E402
 from fsid.denoise import model as model_module  # noqa: E402
+from fsid.denoise.denoise import variance_at_grey  # noqa: E402
 from fsid.denoise.export import export  # noqa: E402
 from fsid.denoise.files import denoise_file, noise_of  # noqa: E402
 from fsid.denoise.interface import denoise  # noqa: E402
@@ -198,13 +199,41 @@ def test_noise_beyond_networks_is_said(
         strong = NoiseLevel((k, k, k, k), (1e-5, 1e-5, 1e-5, 1e-5))
         write_dng(folder / f"{name}.dng", replace(noisy_raw(), noise=strong))
     main(["denoise", str(folder), str(tmp_path / "out"), "--model", str(network)])
-    assert "b.dng and 1 more: more noise than networks" in capsys.readouterr().err
+    assert (
+        "b.dng and 1 more: more noise than the network knows (variance at mid-grey above 0.0036)"
+        in capsys.readouterr().err
+    )
     for name, told in (("a", False), ("c", True)):
         command = ["denoise", str(folder / f"{name}.dng"), str(tmp_path / "one.dng"), "--model", str(network)]
         main(command)
-        assert ("c.dng: more noise than networks" in capsys.readouterr().err) == told
+        assert ("c.dng: more noise than the network knows" in capsys.readouterr().err) == told
         main([*command, "--quiet"])
         assert capsys.readouterr().err == ""
+
+
+def test_a_network_knows_the_noise_that_its_card_says(
+    tmp_path: Path, noisy_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    stated = variance_at_grey(PROFILE.level(3200))
+    net, file = RawDenoiser(CARD.network), tmp_path / "a.safetensors"
+    for most_noise, told in ((1.01 * stated, False), (0.9 * stated, True)):
+        save_model(file, net.state_dict(), replace(CARD, most_noise=most_noise))
+        main(["denoise", str(noisy_file), str(tmp_path / "one.dng"), "--model", str(file)])
+        assert ("more noise than the network knows" in capsys.readouterr().err) == told
+
+
+def test_levels_of_more_noise_than_a_model_knows_are_said(
+    tmp_path: Path, photos: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model, testset = tmp_path / "own.safetensors", tmp_path / "testset"
+    card = replace(CARD, most_noise=variance_at_grey(load_profile("pixel6").level(2000)))
+    save_model(model, RawDenoiser(card.network).state_dict(), card)
+    main(["testset", "photos", str(photos), "-o", str(testset), "--iso", "800", "6400", "--quiet"])
+    capsys.readouterr()
+    main(["evaluate", str(testset), "--model", str(model), "--model", "nafnet-small"])
+    said = capsys.readouterr().err
+    assert "note: own: at iso6400 there is more noise than it was trained on" in said
+    assert "nafnet-small: at" not in said
 
 
 def test_noise_that_the_image_contradicts_is_said(
@@ -329,7 +358,7 @@ def test_what_is_said_of_files_does_not_depend_on_a_broken_one(
     (folder / "c.dng").write_bytes((folder / "a.dng").read_bytes()[:5000])
     said = refused("denoise", folder, tmp_path / "out", "--model", network)
     assert f"the noise of 1 of 2 files, the first one {folder / 'a.dng'}, is estimated" in said
-    assert f"{folder / 'b.dng'}: more noise than networks keep" in said
+    assert f"{folder / 'b.dng'}: more noise than the network knows" in said
 
 
 def test_a_folder_may_be_finished_without_doing_it_again(

@@ -40,6 +40,7 @@ from fsid.denoise import (  # noqa: E402
 )
 from fsid.denoise.board import Board  # noqa: E402
 from fsid.denoise.checkpoint import TrainState, load_checkpoint  # noqa: E402
+from fsid.denoise.denoise import variance_at_grey  # noqa: E402
 from fsid.denoise.raw_denoiser import RawDenoiser  # noqa: E402
 from fsid.denoise.stabilise import stabilise, unstabilise  # noqa: E402
 from fsid.denoise.train import _prepare, _step, learning_rate, noise_left  # noqa: E402
@@ -227,6 +228,8 @@ def test_the_best_network_on_held_out_scenes_is_kept(tmp_path: Path, monkeypatch
     assert card["details"]["config"]["shrink"] == [1]
     assert card["sessions"][-1]["first_step"] == 0
     assert card["training"].startswith("8 images")
+    noisiest = max(variance_at_grey(load_profile(name).level(config.iso_max)) for name in config.profiles)
+    assert card["most_noise"] == pytest.approx(noisiest)
     last = load_denoiser(tmp_path / "run" / "last.safetensors").net.state_dict()
     watch = validation(held_out(folder, config), config, torch.device("cpu"))
     assert watch.measure(last)["psnr_scenes"] == pytest.approx(scores[-1], abs=1e-9)

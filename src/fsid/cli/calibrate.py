@@ -10,9 +10,9 @@ from rich.text import Text
 from tyro.conf import Positional
 
 from fsid.cli.arguments import Output, black_levels
+from fsid.cli.notes import note
 from fsid.cli.progress import progress_bar
 from fsid.cli.tables import print_table
-from fsid.terminal import Terminal
 
 if TYPE_CHECKING:
     from fsid.sensor.camera_fit import Calibration
@@ -83,8 +83,8 @@ def calibrate(
         )
     pictures = {} if plot is None else {plot: calibration_picture(found, plot.suffix)}
     write_together({**pictures, output: profile_file(found.profile)})
-    for note in found.notes:
-        Terminal(stderr=True, quiet=quiet).print(Text(f"note: {note}"), soft_wrap=True)
+    for line in found.notes:
+        note(line, quiet=quiet)
     print_table(_table(found), quiet=quiet)
 
 

@@ -12,8 +12,9 @@ from rich.text import Text
 from tyro.conf import Positional
 
 from fsid.cli.arguments import Ensemble, black_levels
-from fsid.cli.denoise_notes import note, note_guessed, note_left_out, note_noises, note_other_frames
+from fsid.cli.denoise_notes import note_guessed, note_left_out, note_noises, note_other_frames
 from fsid.cli.iso_notes import note_extrapolation, note_files
+from fsid.cli.notes import note
 from fsid.cli.progress import progress_bar
 from fsid.errors import FsidError
 from fsid.terminal import Terminal, error_line
@@ -71,6 +72,7 @@ def denoise(
         quiet: No progress bar, no line on the noise level.
     """
     from fsid.denoise import check_options, denoise_file, denoise_folder, find_raws, load_model
+    from fsid.denoise.denoise import most_noise
     from fsid.denoise.files import target_in
     from fsid.sensor import Layout
 
@@ -113,7 +115,7 @@ def denoise(
                 )
         finally:  # what is to be said of those that are done does not depend on the others
             note_guessed(noises, quiet=quiet)
-            note_noises(noises, quiet=quiet)
+            note_noises(noises, most_noise(network.card), quiet=quiet)
         return
     with progress_bar("denoising", "tiles", quiet=quiet) as progress:
         noise = denoise_file(
@@ -131,7 +133,7 @@ def denoise(
         k, sigma2 = (sum(values) / 4 for values in (noise.level.k, noise.level.sigma2))
         line = f"noise: {noise.source}, k = {k:.3g}, sigma2 = {sigma2:.3g}"
         console.print(Text(line), soft_wrap=True)
-    note_noises({input: noise}, quiet=quiet)
+    note_noises({input: noise}, most_noise(network.card), quiet=quiet)
 
 
 def _check_layout(layout: Layout, paths: Sequence[Path]) -> None:

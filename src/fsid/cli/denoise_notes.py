@@ -7,17 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from rich.text import Text
 
-from fsid.terminal import Terminal
+from fsid.cli.notes import note
 
 if TYPE_CHECKING:
     from fsid.denoise import Noise
     from fsid.sensor import Layout
-
-
-def note(line: str, *, quiet: bool = False) -> None:
-    Terminal(stderr=True, quiet=quiet).print(Text(f"note: {line}"), soft_wrap=True)
 
 
 def note_other_frames(layout: Layout, profile: str | None, *, quiet: bool) -> None:
@@ -53,17 +48,17 @@ def note_guessed(noises: Mapping[Path, Noise], *, quiet: bool) -> None:
         note(line, quiet=quiet)
 
 
-def note_noises(noises: Mapping[Path, Noise], *, quiet: bool) -> None:
-    """Lines on the files that may not be denoised as they should be: those that hold more noise than networks
-    keep colours in, that were denoised before, that show far more noise than was taken off, or far less."""
-    from fsid.denoise.denoise import MAX_TOLD, is_beyond_networks
+def note_noises(noises: Mapping[Path, Noise], most_noise: float, *, quiet: bool) -> None:
+    """Lines on the files that may not be denoised as they should be: those that hold more noise than the
+    network knows, that were denoised before, that show far more noise than was taken off, or far less.
 
-    if strong := [path for path, noise in noises.items() if is_beyond_networks(noise.level)]:
-        line = (
-            f"{_named(strong)}: more noise than networks keep all colours in "
-            f"(variance at mid-grey above {MAX_TOLD:g}); look at the result"
-        )
-        note(line, quiet=quiet)
+    most_noise: variance at mid-grey up to which the network knows noise.
+    """
+    from fsid.denoise.denoise import variance_at_grey
+
+    if strong := [path for path, noise in noises.items() if variance_at_grey(noise.level) > most_noise]:
+        line = f"{_named(strong)}: more noise than the network knows"
+        note(f"{line} (variance at mid-grey above {most_noise:.2g}); look at the result", quiet=quiet)
     if left := [path for path, noise in noises.items() if noise.is_left]:
         said = "denoised before, as NoiseReductionApplied says; what is smoothed now may be detail"
         note(f"{_named(left)}: {said}", quiet=quiet)

@@ -9,6 +9,7 @@ from tyro.conf import Positional, UseAppendAction
 
 from fsid.cli.arguments import Ensemble, OptionalOutput
 from fsid.cli.iso_notes import note_files
+from fsid.cli.notes import note
 from fsid.cli.progress import progress_bar
 from fsid.cli.tables import print_table
 from fsid.files import check_folder
@@ -41,8 +42,11 @@ def evaluate(
 
     if output is not None:
         check_folder(output)
+    notes: list[str] = []
     with progress_bar("measuring", "captures", quiet=quiet) as progress:
-        comparison = evaluate_models(testset, model, ensemble=ensemble, progress=progress)
+        comparison = evaluate_models(testset, model, ensemble=ensemble, progress=progress, note=notes.append)
+    for line in notes:
+        note(line, quiet=quiet)
     made = comparison.testset
     if made.camera in profile_names():  # that of a file is not there to be asked
         note_files(made.camera, made.captures(testset), quiet=quiet)

@@ -53,7 +53,7 @@ def experiment(
         seeds: One training per source and seed.
         width: Width of a training frame in pixels; photographs are cut to no less than 1024.
         height: Height of a training frame in pixels; photographs likewise.
-        camera: Noise profile of all data, trainings and tests.
+        camera: Noise profile of all data, trainings (to the highest ISO that is tested) and tests.
         set: Settings of the scenes, key=value, as for fsid generate; what all sources share are options.
         workers: Processes that render.
         quiet: No progress bar.

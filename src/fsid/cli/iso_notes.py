@@ -6,22 +6,17 @@ from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 
+from fsid.cli.notes import note
 from fsid.errors import FsidError
-from fsid.terminal import Terminal
 
 
 def note_extrapolation(names: Iterable[str], iso_min: float, iso_max: float, *, quiet: bool) -> None:
     """A line for each profile whose measured ISOs the range exceeds by more than two stops."""
     from fsid.sensor import far_extrapolated
 
-    console = Terminal(stderr=True, quiet=quiet)
     for profile in far_extrapolated(names, iso_min, iso_max):
-        console.print(
-            f"note: profile {profile.name} was measured at {_range(profile.iso[0], profile.iso[-1])}; "
-            f"its noise at {_range(iso_min, iso_max)} is extrapolated far",
-            soft_wrap=True,
-            markup=False,
-        )
+        measured = f"profile {profile.name} was measured at {_range(profile.iso[0], profile.iso[-1])}"
+        note(f"{measured}; its noise at {_range(iso_min, iso_max)} is extrapolated far", quiet=quiet)
 
 
 def note_files(profile: str, paths: Iterable[Path], *, quiet: bool) -> None:

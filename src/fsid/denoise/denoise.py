@@ -104,18 +104,19 @@ def denoise_raw(
     return replace(raw, mosaic=mosaic, noise=None, metadata=raw.metadata.with_noise_removed(min(strength, 1)))
 
 
-def is_beyond_networks(level: NoiseLevel) -> bool:
-    """Whether it is more noise than `MAX_TOLD`, of which a network may lose colours."""
-    return _at_grey(level) > MAX_TOLD
+def most_noise(card: ModelCard) -> float:
+    """Variance at mid-grey up to which a network knows noise; `MAX_TOLD` where its card does not say."""
+    return card.most_noise or MAX_TOLD
 
 
-def _at_grey(level: NoiseLevel) -> float:
+def variance_at_grey(level: NoiseLevel) -> float:
+    """Of the site that has most."""
     return max(GREY * k + sigma2 for k, sigma2 in zip(level.k, level.sigma2, strict=True))
 
 
 def _stronger(level: NoiseLevel, times: float) -> NoiseLevel:
     """Of so many times the variance, or as many as `MAX_TOLD` allows."""
-    times = min(times, max(MAX_TOLD / max(_at_grey(level), 1e-12), 1.0))
+    times = min(times, max(MAX_TOLD / max(variance_at_grey(level), 1e-12), 1.0))
     return NoiseLevel(four(times * value for value in level.k), four(times * value for value in level.sigma2))
 
 

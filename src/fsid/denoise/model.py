@@ -40,12 +40,14 @@ class ModelCard:
     """What a network is.
 
     network: its size. patch_px: side of its training patches in packed pixels. training: one line on what it
-    was trained on. details: settings and results in plain JSON values, for people; nothing is read back.
+    was trained on. most_noise: variance at mid-grey of the strongest noise among it, 0 where unknown.
+    details: settings and results in plain JSON values, for people; nothing is read back.
     """
 
     network: NetworkConfig
     patch_px: int
     training: str = ""
+    most_noise: float = 0.0
     details: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

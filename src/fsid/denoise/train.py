@@ -34,6 +34,7 @@ from fsid.dataset.index import StoredMosaic, identity, index_mosaics
 from fsid.dataset.loader import Batch, PatchConfig, PatchDataset
 from fsid.denoise.board import Board
 from fsid.denoise.checkpoint import TrainState, load_checkpoint, save_checkpoint
+from fsid.denoise.denoise import variance_at_grey
 from fsid.denoise.initial import initial_network
 from fsid.denoise.live import LiveLine
 from fsid.denoise.model import MODEL_FILE, Denoiser, ModelCard, save_model
@@ -45,7 +46,7 @@ from fsid.denoise.train_config import TrainConfig
 from fsid.denoise.validate import held_out, validation
 from fsid.errors import FsidError
 from fsid.files import check_folder, held, write_atomically
-from fsid.sensor.profiles import profiles_digest
+from fsid.sensor.profiles import load_bayer_profile, profiles_digest
 from fsid.terminal import Terminal
 
 HISTORY_FILE, VALIDATION_FILE = "history.json", "validation.json"
@@ -239,10 +240,13 @@ def _card(data_dir: Path, config: TrainConfig, images: int, initial: Denoiser | 
     file = data_dir / CONFIG_FILE
     training = f"{counted(images, 'image')} of {data_dir.resolve().name}"
     details = {"config": to_plain(config), "data": read_yaml(file) if file.is_file() else {}}
+    strongest = [load_bayer_profile(name).level(config.iso_max) for name in config.profiles]
+    most_noise = max(map(variance_at_grey, strongest))
     if initial is not None:
         training += f" after {initial.card.training}"
+        most_noise = max(most_noise, initial.card.most_noise)
         details["initial"] = to_plain(initial.card)
-    return ModelCard(config.network, config.patch_px, training, details)
+    return ModelCard(config.network, config.patch_px, training, most_noise, details)
 
 
 def load_history(run_dir: str | Path) -> tuple[list[int], list[float], list[float]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
 from collections.abc import Callable, Iterable, Sequence
 from copy import deepcopy
 from dataclasses import asdict, astuple, dataclass, fields, replace
@@ -25,7 +26,8 @@ from fsid.sensor import Raw, develop, read_raw, upright
 
 @dataclass(frozen=True)
 class Method:
-    """A denoiser under test. training: what it was trained on, in words ("" for the baselines).
+    """A denoiser under test. training: what it was trained on, in words ("" for the baselines). most_noise:
+    variance at mid-grey up to which it knows noise, where that is known.
 
     denoise: may change what it is given, which is a copy; returns a finite Raw of the same size and CFA, of
     which the mosaic is measured: it is developed with the colours of what was given.
@@ -34,6 +36,7 @@ class Method:
     name: str
     training: str
     denoise: Callable[[Raw], Raw]
+    most_noise: float = math.inf
 
 
 @dataclass(frozen=True)

@@ -4,22 +4,26 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 from fsid.counted import counted
 from fsid.errors import FsidError
 from fsid.evaluate.compare import CLASSICAL, NOISY, Comparison, Method, compare, write_images, write_results
-from fsid.evaluate.testset import read_testset
+from fsid.evaluate.testset import TestSet, read_testset
 from fsid.files import make_folder
+from fsid.sensor import read_raw
 
 
 def model_method(path: str | Path, name: str, *, ensemble: int = 1) -> Method:
     """A trained model (as `load_model` takes it) as a method; its card says what it was trained on. ensemble:
     as for `denoise_raw`."""
     from fsid.denoise import denoise_raw, load_model
+    from fsid.denoise.denoise import most_noise
 
     model = load_model(path)
-    return Method(name, model.card.training, lambda raw: denoise_raw(raw, model, ensemble=ensemble))
+    denoise = partial(denoise_raw, model=model, ensemble=ensemble)
+    return Method(name, model.card.training, denoise, most_noise(model.card))
 
 
 def model_names(models: Sequence[str | Path]) -> list[str]:
@@ -50,17 +54,32 @@ def evaluate_models(
     *,
     ensemble: int = 1,
     progress: Callable[[int, int], None] = lambda done, total: None,
+    note: Callable[[str], None] = lambda line: None,
 ) -> Comparison:
     """Compare the baselines and `models` (as `load_model` takes them), with crops of the middle level.
 
-    ensemble: of each model, as for `denoise_raw`; where it is not 1 their names say so.
+    ensemble: of each model, as for `denoise_raw`; where it is not 1 their names say so. note: told in one
+    line of each model at which levels the test set holds more noise than it knows.
     """
-    levels = read_testset(testset).levels
+    made = read_testset(testset)
+    levels = made.levels
     copies = "" if ensemble == 1 else f" (mean of {ensemble})"
-    named = zip(models, model_names(models), strict=True)
-    trained = [model_method(path, f"{name}{copies}", ensemble=ensemble) for path, name in named]
-    methods = [NOISY, CLASSICAL, *trained]
+    methods = [NOISY, CLASSICAL]
+    noisiest = {level: _variance_at(testset, made, level) for level in levels} if models else {}
+    for path, name in zip(models, model_names(models), strict=True):
+        method = model_method(path, f"{name}{copies}", ensemble=ensemble)
+        methods.append(method)
+        if beyond := [level for level, variance in noisiest.items() if variance > method.most_noise]:
+            note(f"{method.name}: at {', '.join(beyond)} there is more noise than it was trained on")
     return compare(testset, methods, crop_levels=levels[len(levels) // 2 :][:1], progress=progress)
+
+
+def _variance_at(testset: str | Path, made: TestSet, level: str) -> float:
+    """At mid-grey, of the first capture at a level; 0 where it does not state its noise."""
+    from fsid.denoise.denoise import variance_at_grey
+
+    raw = read_raw(made.noisy(testset, made.images[0], level, 0))
+    return variance_at_grey(raw.noise) if raw.noise else 0.0
 
 
 def write_comparison(comparison: Comparison, testset: str | Path, out: str | Path) -> None:
