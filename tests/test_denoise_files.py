@@ -140,6 +140,48 @@ def test_strength(network: Path) -> None:
             denoise_raw(raw, model, strength=wrong)
 
 
+def shadows(black_level: int, iso: float) -> tuple[Raw, np.ndarray]:
+    """A noisy image of four dark patches, and their light."""
+    light = np.repeat(np.repeat(np.array([[0.0, 0.003], [0.01, 0.04]], np.float32), 64, axis=0), 64, axis=1)
+    clean = Raw(light, PROFILE.cfa, black_level, black_level + 959, (2, 1, 1.6), PROFILE.xyz_to_camera[0])
+    return noisy_from_clean(np.random.default_rng(0), clean, iso, PROFILE.level(iso)), light
+
+
+@pytest.mark.parametrize(("black_level", "ensemble"), [(0, 1), (0, 2), (8, 1), (64, 1)])
+def test_shadows_are_as_dark_as_their_light_wherever_noise_is_cut_off(
+    black_level: int, ensemble: int
+) -> None:
+    """Each colour in each patch, where the file is up to 0.4 sigma (4.5 DN) too bright."""
+    noisy, light = shadows(black_level, 3200)
+    done: list[tuple[int, int]] = []
+    denoised = denoise_raw(
+        noisy, load_model("nafnet-small"), ensemble=ensemble, progress=lambda *at: done.append(at)
+    )
+    error = pack(denoised.mosaic - light, PROFILE.cfa).reshape(4, 2, 32, 2, 32)[:, :, 4:28, :, 4:28]
+    np.testing.assert_allclose(error.mean((2, 4)) * 959, 0, atol=1.5)
+    passes = ensemble + (black_level < 64)
+    assert done == [(n + 1, passes) for n in range(passes)]
+
+
+def test_what_is_dark_for_another_reason_stays_so() -> None:
+    """Rows without data at DN 0, and noise that the file states is not there."""
+    noisy, _ = shadows(0, 3200)
+    noisy.mosaic[:48] = 0
+    dark = denoise_raw(noisy, load_model("nafnet-small")).mosaic[8:40]
+    assert abs(dark.mean()) * 959 < 1
+
+
+def test_a_network_of_cameras_that_store_black_as_0_knows_their_shadows(network: Path) -> None:
+    model, noisy = load_model(network), shadows(0, 3200)[0]
+    assert model.card.lowest == pytest.approx(-64 / 959)
+    at_black = replace(model, card=replace(model.card, lowest=0.0))
+    calls: list[int] = []
+    denoise_raw(noisy, at_black, progress=lambda done, tiles: calls.append(tiles))
+    assert calls == [1]
+    with pytest.raises(FsidError, match="lowest"):
+        replace(model.card, lowest=0.1)
+
+
 @pytest.mark.parametrize("strength", [0.5, 1, 2])
 def test_saturated_light_stays_at_the_white_level(strength: float) -> None:
     """As in the DNG. Far above saturation pixels have no noise."""

@@ -230,6 +230,7 @@ def test_the_best_network_on_held_out_scenes_is_kept(tmp_path: Path, monkeypatch
     assert card["training"].startswith("8 images")
     noisiest = max(variance_at_grey(load_profile(name).level(config.iso_max)) for name in config.profiles)
     assert card["most_noise"] == pytest.approx(noisiest)
+    assert card["lowest"] == pytest.approx(-64 / 959)  # x of DN 0
     last = load_denoiser(tmp_path / "run" / "last.safetensors").net.state_dict()
     watch = validation(held_out(folder, config), config, torch.device("cpu"))
     assert watch.measure(last)["psnr_scenes"] == pytest.approx(scores[-1], abs=1e-9)

@@ -9,6 +9,8 @@ That also keeps them what the network was trained on: means over a patch, not ov
 a convolutional network; tiles that overlap by its receptive radius and start on multiples of its stride
 repeat the untiled result.
 
+Noise that the camera cut off is drawn anew after a first pass (`cut_off`).
+
 The network knows one geometry, an RGGB tile seen from R. Other patterns are brought to it by mirroring one
 row or column outwards (index -1 is index 1, which has the same colour), and the extra pixels are cut off
 again.
@@ -22,6 +24,7 @@ from typing import Protocol
 
 import numpy as np
 
+from fsid.denoise.cut_off import drawn_anew, lowest_levels
 from fsid.denoise.ensemble import check_ensemble, self_ensemble
 from fsid.denoise.model import ModelCard
 from fsid.errors import FsidError
@@ -86,17 +89,25 @@ def denoise_raw(
     level = level if level is not None else raw.noise
     _check(raw, level, strength, tile_px)
     assert level is not None
+    stated = level
     if strength > 1:
         level = _stronger(level, strength**2)
+
+    known = model.card.lowest
+    lowest = lowest_levels(raw, known)
+    first = int(any(limit is not None for limit in lowest))
 
     def denoised(mosaic: np.ndarray, cfa: str, level: NoiseLevel, copy: int) -> np.ndarray:
         def told(done: int, tiles: int) -> None:
             if progress is not None:
-                progress(copy * tiles + done, ensemble * tiles)
+                progress((first + copy) * tiles + done, (first + ensemble) * tiles)
 
         return _denoise_mosaic(mosaic, cfa, model, level, tile_px, told)
 
-    mosaic = self_ensemble(raw.mosaic, raw.cfa, level, ensemble, denoised)
+    mosaic = raw.mosaic
+    if first:
+        mosaic = drawn_anew(raw, denoised(mosaic, raw.cfa, level, -1), stated, lowest, known)
+    mosaic = self_ensemble(mosaic, raw.cfa, level, ensemble, denoised)
     np.minimum(mosaic, max(1.0, float(raw.mosaic.max())), out=mosaic)
     if strength < 1:
         mosaic *= np.float32(strength)

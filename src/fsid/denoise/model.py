@@ -8,6 +8,7 @@ that a user hands over is ever unpickled. A readable copy of the card is written
 from __future__ import annotations
 
 import json
+import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -40,19 +41,23 @@ class ModelCard:
     """What a network is.
 
     network: its size. patch_px: side of its training patches in packed pixels. training: one line on what it
-    was trained on. most_noise: variance at mid-grey of the strongest noise among it, 0 where unknown.
-    details: settings and results in plain JSON values, for people; nothing is read back.
+    was trained on. details: settings and results in plain JSON values, for people; nothing is read back.
+    lowest: x of DN 0 of the cameras that it was trained on, below which it has seen no noise; of several, the
+    highest. most_noise: variance at mid-grey of the strongest noise that it was trained on, 0 where unknown.
     """
 
     network: NetworkConfig
     patch_px: int
     training: str = ""
-    most_noise: float = 0.0
     details: dict[str, Any] = field(default_factory=dict)
+    lowest: float = -64 / 959  # of all built-in profiles
+    most_noise: float = 0.0
 
     def __post_init__(self) -> None:
         if not 1 <= self.patch_px <= MAX_PATCH_PX:
             raise FsidError(f"patch_px {self.patch_px}: must be 1 to {MAX_PATCH_PX}")
+        if not -math.inf < self.lowest <= 0:
+            raise FsidError(f"lowest {self.lowest}: must be finite and at most 0")
 
 
 @dataclass(frozen=True)

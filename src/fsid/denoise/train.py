@@ -240,13 +240,14 @@ def _card(data_dir: Path, config: TrainConfig, images: int, initial: Denoiser | 
     file = data_dir / CONFIG_FILE
     training = f"{counted(images, 'image')} of {data_dir.resolve().name}"
     details = {"config": to_plain(config), "data": read_yaml(file) if file.is_file() else {}}
-    strongest = [load_bayer_profile(name).level(config.iso_max) for name in config.profiles]
-    most_noise = max(map(variance_at_grey, strongest))
+    cameras = [load_bayer_profile(name) for name in config.profiles]
+    lowest = max(-camera.black_level / camera.span for camera in cameras)
+    most_noise = max(variance_at_grey(camera.level(config.iso_max)) for camera in cameras)
     if initial is not None:
         training += f" after {initial.card.training}"
         most_noise = max(most_noise, initial.card.most_noise)
         details["initial"] = to_plain(initial.card)
-    return ModelCard(config.network, config.patch_px, training, most_noise, details)
+    return ModelCard(config.network, config.patch_px, training, details, lowest, most_noise)
 
 
 def load_history(run_dir: str | Path) -> tuple[list[int], list[float], list[float]]:
