@@ -86,8 +86,13 @@ for _kind, _hook in ((int, _strict_int), (float, _strict_float), (bool, _strict_
     _CONVERTER.register_structure_hook(_kind, _hook)
 
 
+_PLAIN = {bool, int, float, str, type(None)}
+
+
 def to_plain(settings: Any) -> Any:
     """Dataclasses and tuples as dicts and lists, what NumPy holds and paths as what YAML and JSON hold."""
+    if type(settings) in _PLAIN:  # nearly all that a scene holds
+        return settings
     if dataclasses.is_dataclass(settings):
         return {field.name: to_plain(getattr(settings, field.name)) for field in dataclasses.fields(settings)}
     if isinstance(settings, Mapping):
