@@ -22,8 +22,9 @@ from fsid.assets import MATERIAL_VARIANTS, MaterialMaps, material_families
 from fsid.errors import FsidError
 from fsid.render import Frame, GlInfo, Renderer, egl_devices, gpu_device, texels
 from fsid.render.context import gl
+from fsid.render.drawable import view_of
 from fsid.render.layers import MOST_LAYERS, LayerStore, fitting_size
-from fsid.render.texels import bake_texels, level_ranges
+from fsid.render.texels import Texels, bake_texels, level_ranges
 from fsid.render.texture_array import TextureArray
 from fsid.scene import LensConfig, LightConfig, MotionConfig, Scene, SceneConfig, sample
 
@@ -85,6 +86,26 @@ def test_slots_of_materials_do_not_matter(renderer: Renderer) -> None:
     for seed in (2, 3):
         renderer.render(scene(seed))
     assert fingerprint(renderer.render(scene(1))) == first
+
+
+def test_a_gpu_keeps_layers_of_other_sizes(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Scenes of few and of many materials take turns: none loads again what it had."""
+    loaded: list[int] = []
+
+    def load(family: str, variant: int, size: int) -> Texels:
+        loaded.append(size)
+        return bake_texels(family, variant, size)
+
+    monkeypatch.setattr(renderer, "_on_gpu", True)
+    images, loads = [], []
+    for size in (64, 128, 64, 128):
+        monkeypatch.setattr("fsid.render.renderer.fitting_size", lambda *_, size=size: size)
+        images.append(renderer.draw(view_of(scene(1), 0), bake=load).radiance)
+        loads.append(len(loaded))
+    assert set(loaded) == {64, 128}
+    assert loads[1] == loads[3]
+    assert (images[0] == images[2]).all()
+    assert (images[1] == images[3]).all()
 
 
 def test_images_are_free_while_a_material_is_drawn_and_come_back(

@@ -15,8 +15,9 @@ from fsid.render.texture_array import TextureArray
 BUDGET_BYTES = 224 * 2**20
 """Texture memory: 21 layers of 1024 texels, four times as many of 512."""
 
-GPU_BUDGET_BYTES = 2**30
-"""What may stay resident on a GPU, which several renderers may share; scenes have the same texels there."""
+GPU_BUDGET_BYTES = 2**30 // 3
+"""What may stay resident of each size on a GPU, which several renderers may share: tiles of 1024, 512 and 256
+texels take a GiB. Scenes have the same texels there."""
 
 MOST_LAYERS = 480
 """Resident at most, however small they are: those of five crowded scenes. 95 % of what later scenes need is

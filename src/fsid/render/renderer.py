@@ -122,6 +122,7 @@ class Renderer:
         self._texture_size = texture_size
         self._drain = context.finish if self._on_gpu else Drain(context).run
         self._layers = self._new_layers(texture_size)
+        self._idle_layers: dict[int, LayerStore] = {}  # by size
         mips = MipLevels(context, compute=compute)
         self._targets = Targets(context, grid, mips, compute=compute)
         self._mirror_targets = [Targets(context, grid, mips, compute=compute) for _ in range(MOST)]
@@ -277,8 +278,7 @@ class Renderer:
         wanted = {(m.family, m.variant): None for d in view.drawables for m in d.materials}
         size = fitting_size(self._texture_size, len(wanted))
         if size != self._layers.size:
-            self._layers.release()
-            self._layers = self._new_layers(size)
+            self._layers = self._layers_of(size)
         return self._layers.load(wanted, bake)
 
     def _bake(self, family: str, variant: int, size: int) -> Texels:
@@ -289,6 +289,15 @@ class Renderer:
         if not self._on_gpu and self._targets.size != (0, 0):
             self._targets.release()
             self._drain()
+
+    def _layers_of(self, size: int) -> LayerStore:
+        """Those of another size instead. On a GPU those of now stay: scenes of few materials and of many take
+        turns, and each would have to load all of its own."""
+        if not self._on_gpu:
+            self._layers.release()
+            return self._new_layers(size)
+        self._idle_layers[self._layers.size] = self._layers
+        return self._idle_layers.pop(size, None) or self._new_layers(size)
 
     def _new_layers(self, size: int) -> LayerStore:
         if self._on_gpu:
