@@ -19,6 +19,7 @@ from scipy.spatial import ConvexHull, QhullError
 from trimesh.triangles import closest_point
 
 from fsid.assets import Mesh
+from fsid.assets.surfaces import cross
 from fsid.render.drawable import BACKGROUND_ID, CLEAR, Display, Drawable
 from fsid.render.shadows import Source, unit
 from fsid.scene.model import Light, Material
@@ -99,9 +100,11 @@ def hoods_apart(drawables: Sequence[Drawable]) -> tuple[Drawable, ...]:
 
 def _hood_apart(drawable: Drawable) -> list[Drawable]:
     """The parts of a lamp that its light passes through or that touch what shines, and the others."""
+    if drawable.object_id == BACKGROUND_ID or all(m.emission <= 0 for m in drawable.materials):
+        return [drawable]
     parts = np.unique(drawable.mesh.face_parts)
     lamps = [part for part in parts if drawable.materials[part].emission > 0]
-    if not lamps or drawable.object_id == BACKGROUND_ID:
+    if not lamps:
         return [drawable]
     found = {int(part): _display(drawable, part) for part in lamps}
     displays = {part: display for part, display in found.items() if display is not None}
@@ -135,7 +138,7 @@ def _is_opaque(material: Material) -> bool:
 def _display(drawable: Drawable, part: int) -> Display | None:
     """The rectangle of a part that is flat and has a back close behind it and nothing before it."""
     triangles = _triangles(drawable, part)
-    doubled = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    doubled = cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     doubled *= np.sign(np.prod(drawable.transform.scale))  # a mirrored mesh keeps its order of corners
     areas = np.linalg.norm(doubled, axis=1) / 2
     normals = doubled / np.maximum(2 * areas, 1e-18)[:, None]
@@ -173,19 +176,24 @@ def _covered(display: Display, direction: np.ndarray, triangles: np.ndarray) -> 
     w, h = display.half_width, display.half_height
     reach = _BEHIND * 2 * np.sqrt(np.linalg.norm(w) * np.linalg.norm(h))
     places = display.centre + np.array([0 * w, w + h, w - h, h - w, -w - h]) / 2
-    return sum(_meets(place, direction * reach, triangles) for place in places) >= 3
+    return _met(places, direction * reach, triangles) >= 3
 
 
-def _meets(start: np.ndarray, step: np.ndarray, triangles: np.ndarray) -> bool:
-    """Whether the way from `start` to `start + step` crosses a triangle (Moeller and Trumbore 1997)."""
+def _met(starts: np.ndarray, step: np.ndarray, triangles: np.ndarray) -> int:
+    """From how many of `starts` (N, 3) the way by `step` crosses a triangle (Moeller and Trumbore 1997)."""
     a, b, c = (triangles[:, i] for i in range(3))
-    across = np.cross(step, c - a)
+    across = cross(step, c - a)
     volume = ((b - a) * across).sum(1)
-    scale = np.where(np.abs(volume) > 1e-18, volume, np.inf)
-    u = ((start - a) * across).sum(1) / scale
-    turned = np.cross(start - a, b - a)
-    v, t = turned @ step / scale, ((c - a) * turned).sum(1) / scale
-    return bool(((u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0) & (t <= 1) & np.isfinite(scale)).any())
+    wide = np.abs(volume) > 1e-18
+    a, b, c, across, volume = (each[wide] for each in (a, b, c, across, volume))
+    found = 0
+    for start in starts:
+        u = ((start - a) * across).sum(1) / volume
+        near = np.flatnonzero((u >= 0) & (u <= 1))  # few of all
+        turned = cross(start - a[near], b[near] - a[near])
+        v, t = turned @ step / volume[near], ((c[near] - a[near]) * turned).sum(1) / volume[near]
+        found += bool(((v >= 0) & (u[near] + v <= 1) & (t > 0) & (t <= 1)).any())
+    return found
 
 
 def _pieces(drawable: Drawable, wanted: np.ndarray) -> Drawable:
@@ -208,7 +216,7 @@ def _body(drawable: Drawable, part: int) -> tuple[np.ndarray, np.ndarray]:
     normals times m^2, of the convex body that is seen as much of: of its hull, or its own where these are
     less, as of several bulbs."""
     points = _triangles(drawable, part)
-    own = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]) / 2
+    own = cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]) / 2
     areas = np.linalg.norm(own, axis=1)
     closed = np.vstack([own, -own.sum(0)])  # with what closes its opening
     hull = _hull_facets(_vertices(drawable, part))
@@ -224,14 +232,15 @@ def _area(facets: np.ndarray) -> float:
 def _vertices(drawable: Drawable, part: int) -> np.ndarray:
     """(V, 3) metres, as `_body`."""
     mesh = drawable.mesh
-    used = np.unique(mesh.faces[mesh.face_parts == part])
+    used = np.zeros(len(mesh.vertices), bool)
+    used[mesh.faces[mesh.face_parts == part]] = True
     return np.asarray(mesh.vertices[used] * np.array(drawable.transform.scale, np.float32))
 
 
 def _hull_facets(points: np.ndarray) -> np.ndarray | None:
     """(F, 3), as `_body`, of the points (V, 3) that lie farthest in fixed directions; None where these are
     flat."""
-    corners = np.unique((points @ _DIRECTIONS.T).argmax(0))
+    corners = np.unique((_DIRECTIONS @ points.T).argmax(1))
     try:
         hull = ConvexHull(points[corners])
     except QhullError:
@@ -243,7 +252,8 @@ def _hull_facets(points: np.ndarray) -> np.ndarray | None:
 def _triangles(drawable: Drawable, part: int) -> np.ndarray:
     """(F, 3, 3) metres, as `_body`."""
     mesh = drawable.mesh
-    return np.asarray(mesh.vertices[mesh.faces[mesh.face_parts == part]] * np.array(drawable.transform.scale))
+    corners = mesh.vertices.take(mesh.faces[mesh.face_parts == part], axis=0)
+    return np.asarray(corners * np.array(drawable.transform.scale))
 
 
 def _evenly_spread(count: int) -> np.ndarray:
