@@ -274,7 +274,7 @@ def test_levels_of_more_noise_than_a_model_knows_are_said(
     capsys.readouterr()
     main(["evaluate", str(testset), "--model", str(model), "--model", "nafnet-small"])
     said = capsys.readouterr().err
-    assert "note: own: at iso6400 there is more noise than it was trained on" in said
+    assert "note: own: at iso6400 there is more noise than it knows" in said
     assert "nafnet-small: at" not in said
 
 

@@ -48,7 +48,8 @@ at round((side - patch_px) (i + 1/2) / n), halves to the even number, or at 0 wh
 the mean of their averages_out as `averages`, with frozen = 1, to the whole image, or to tiles that start on
 multiples of `multiple` and see `receptive_radius`, rounded up to such a one, beyond what is kept of them.
 Tiles make the same as the whole image with the same averages: what `fsid denoise` makes, but where noise is
-cut off at a DN 0 that lies nearer to black than -0.06: it draws that anew after a first pass, and repeats."""
+cut off at a DN 0 whose x is above 0.9 `lowest` of the card: that it draws anew after a first pass, and
+repeats."""
 
 
 class _Half(nn.Module):

@@ -57,7 +57,7 @@ from fsid.evaluate.experiment_report import write_experiment_report
 from fsid.evaluate.known import known_note
 from fsid.evaluate.models import model_method
 from fsid.evaluate.simulated import LUXES, simulated_testset
-from fsid.evaluate.testset import Setting, levels_of, photo_testset, read_testset
+from fsid.evaluate.testset import levels_of, photo_testset, read_testset
 from fsid.files import make_folder, read_whole
 from fsid.scene import VARIANTS
 from fsid.sensor import load_bayer_profile
@@ -162,13 +162,15 @@ def _check_noise(out: Path, config: ExperimentConfig) -> None:
 
 
 def _noise(training: TrainConfig) -> str:
+    """The noise that a training draws, in words."""
     return f"{', '.join(training.profiles)} at ISO {training.iso_min:g} to {training.iso_max:g}"
 
 
 def _training(config: ExperimentConfig, seed: int) -> TrainConfig:
     """On the noise of the camera, at least from the lowest to the highest ISO that is tested."""
     usual = train_config(config.network)
-    isos = [setting.iso for setting in _levels(config).values()]
+    levels = levels_of(load_bayer_profile(config.camera), TEST_ISOS, LUXES)
+    isos = [setting.iso for setting in levels.values()]
     noise: list[Override] = [
         ("profiles", [config.camera]),
         ("iso_min", min(usual.iso_min, *isos)),
@@ -178,11 +180,6 @@ def _training(config: ExperimentConfig, seed: int) -> TrainConfig:
     training = train_config(config.network, [*noise, f"seed={seed}", *config.train_settings, *steps])
     # scenes and photographs differ in size, and their trainings must not
     return training if training.shrink else replace(training, shrink=(1,))
-
-
-def _levels(config: ExperimentConfig) -> dict[str, Setting]:
-    """The levels of all test sets."""
-    return levels_of(load_bayer_profile(config.camera), TEST_ISOS, LUXES)
 
 
 def _count(config: ExperimentConfig, source: str) -> int:

@@ -70,7 +70,7 @@ def evaluate_models(
         method = model_method(path, f"{name}{copies}", ensemble=ensemble)
         methods.append(method)
         if beyond := [level for level, variance in noisiest.items() if variance > method.most_noise]:
-            note(f"{method.name}: at {', '.join(beyond)} there is more noise than it was trained on")
+            note(f"{method.name}: at {', '.join(beyond)} there is more noise than it knows")
     return compare(testset, methods, crop_levels=levels[len(levels) // 2 :][:1], progress=progress)
 
 
