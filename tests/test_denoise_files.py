@@ -209,6 +209,31 @@ def test_the_strongest_smoothing_keeps_the_colours(strength: float) -> None:
     np.testing.assert_allclose(means, true, rtol=0.03)
 
 
+def test_hot_pixels_are_mended_where_that_is_asked_for(
+    tmp_path: Path, network: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "in").mkdir()
+    raw, spots = noisy_raw(), np.s_[10:250:16, 9:310:20]
+    plain = denoise_raw(raw, load_model(network)).mosaic
+    raw.mosaic[spots] = 1
+    source, out = tmp_path / "in" / "a.dng", tmp_path / "out.dng"
+    write_dng(source, raw)
+    command = ["denoise", str(source), str(out), "--model", str(network)]
+    main(command)
+    assert "hot" not in capsys.readouterr().err
+    assert np.abs(read_raw(out).mosaic - plain)[spots].min() > 0.05
+    main([*command, "--mend-hot-pixels"])
+    count = int(capsys.readouterr().err.partition("hot and dead pixels: ")[2].split()[0])
+    assert count > 0.9 * raw.mosaic[spots].size
+    off = np.abs(read_raw(out).mosaic - plain)[spots]
+    assert np.quantile(off, 0.9) < 0.02
+    write_dng(tmp_path / "in" / "b.dng", noisy_raw())
+    main(
+        ["denoise", str(tmp_path / "in"), str(tmp_path / "out"), "--model", str(network), "--mend-hot-pixels"]
+    )
+    assert f"hot and dead pixels: 0 to {count} mended in a file" in capsys.readouterr().err
+
+
 def test_a_folder_is_done_file_by_file(tmp_path: Path, network: Path, refused: Callable[..., str]) -> None:
     folder, out = tmp_path / "in", tmp_path / "out"
     folder.mkdir()

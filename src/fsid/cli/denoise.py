@@ -12,7 +12,13 @@ from rich.text import Text
 from tyro.conf import Positional
 
 from fsid.cli.arguments import Ensemble, black_levels
-from fsid.cli.denoise_notes import note_guessed, note_left_out, note_noises, note_other_frames
+from fsid.cli.denoise_notes import (
+    note_guessed,
+    note_hot_pixels,
+    note_left_out,
+    note_noises,
+    note_other_frames,
+)
 from fsid.cli.iso_notes import note_extrapolation, note_files
 from fsid.cli.notes import note
 from fsid.cli.progress import progress_bar
@@ -33,6 +39,7 @@ def denoise(
     iso: float | None = None,
     strength: float = 1.0,
     ensemble: Ensemble = 1,
+    mend_hot_pixels: bool = False,
     backend: Literal["torch", "onnx"] | None = None,
     cfa: str | None = None,
     black_level: str | None = None,
@@ -60,6 +67,8 @@ def denoise(
             colours (at most 100).
         ensemble: Average over so many mirrored and transposed copies of the image: less error (0.1 dB with 8,
             two thirds of that with 2) for as many times the time.
+        mend_hot_pixels: Make single pixels that are far brighter or darker than all around them, as of long
+            exposures, of their neighbours first. Of images as sharp as their pixels it takes dots of light.
         backend: What runs the network: torch (on a GPU where there is one) or onnx (onnxruntime, on the CPU);
             by default onnx for an .onnx file, else torch.
         cfa: Colours of a bare mosaic's first 2x2 pixels, read row by row: RGGB, BGGR, GRBG or GBRG.
@@ -107,6 +116,7 @@ def denoise(
                     iso=iso,
                     strength=strength,
                     ensemble=ensemble,
+                    mend_hot_pixels=mend_hot_pixels,
                     layout=layout,
                     skip_existing=skip_existing,
                     progress=progress,
@@ -116,6 +126,7 @@ def denoise(
         finally:  # what is to be said of those that are done does not depend on the others
             note_guessed(noises, quiet=quiet)
             note_noises(noises, most_noise(network.card), quiet=quiet)
+            note_hot_pixels(noises, quiet=quiet or not mend_hot_pixels)
         return
     with progress_bar("denoising", "tiles", quiet=quiet) as progress:
         noise = denoise_file(
@@ -126,6 +137,7 @@ def denoise(
             iso=iso,
             strength=strength,
             ensemble=ensemble,
+            mend_hot_pixels=mend_hot_pixels,
             layout=layout,
             progress=progress,
         )
@@ -134,6 +146,7 @@ def denoise(
         line = f"noise: {noise.source}, k = {k:.3g}, sigma2 = {sigma2:.3g}"
         console.print(Text(line), soft_wrap=True)
     note_noises({input: noise}, most_noise(network.card), quiet=quiet)
+    note_hot_pixels({input: noise}, quiet=quiet or not mend_hot_pixels)
 
 
 def _check_layout(layout: Layout, paths: Sequence[Path]) -> None:

@@ -73,6 +73,15 @@ def note_noises(noises: Mapping[Path, Noise], most_noise: float, *, quiet: bool)
             note(f"{line}; the result may be {result}", quiet=quiet)
 
 
+def note_hot_pixels(noises: Mapping[Path, Noise], *, quiet: bool) -> None:
+    """A line on how many pixels were mended."""
+    counts = [noise.hot for noise in noises.values()]
+    if len(counts) == 1:
+        note(f"hot and dead pixels: {counts[0]} mended", quiet=quiet)
+    elif counts:
+        note(f"hot and dead pixels: {min(counts)} to {max(counts)} mended in a file", quiet=quiet)
+
+
 def _named(paths: Sequence[Path]) -> str:
     """The first of `paths`, and how many there are beside it."""
     return f"{paths[0]} and {len(paths) - 1} more" if len(paths) > 1 else str(paths[0])

@@ -23,6 +23,7 @@ from fsid.sensor import (
     estimate_noise,
     load_bayer_profile,
     read_raw,
+    without_hot_pixels,
     write_dng,
 )
 from fsid.sensor.bare import BARE_SUFFIXES, HEADERLESS_SUFFIXES
@@ -40,7 +41,8 @@ _SMALLEST_PX = 22  # LibRaw takes no smaller image for a RAW
 class Noise:
     """A noise level, and in words where it came from. is_estimated: from the image itself. is_left: what was
     left by a denoiser that removed all noise, as the file states. shown: else, variance that the image shows
-    over that of a level that it contradicts (`fsid.sensor.blind.contradiction`).
+    over that of a level that it contradicts (`fsid.sensor.blind.contradiction`). hot: how many
+    pixels were mended.
     """
 
     level: NoiseLevel
@@ -48,6 +50,7 @@ class Noise:
     is_estimated: bool = False
     is_left: bool = False
     shown: float | None = None
+    hot: int = 0
 
 
 def find_raws(folder: str | Path, *, bare: bool = False) -> list[Path]:
@@ -153,12 +156,14 @@ def denoise_file(
     iso: float | None = None,
     strength: float = 1.0,
     ensemble: int = 1,
+    mend_hot_pixels: bool = False,
     layout: Layout | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Noise:
     """Denoise one RAW file into a DNG with finer levels (a denoised value is no whole DN) and a preview.
 
-    The noise level that was used is returned. FsidError: `denoise_raw`, unreadable input, another suffix, a
+    mend_hot_pixels: make pixels that show no light (`fsid.sensor.hot_pixels`) of those around them first. The
+    noise level that was used is returned. FsidError: `denoise_raw`, unreadable input, another suffix, a
     folder that is not there, and `source` as `target`: an original cannot be made again.
     """
     source, target = Path(source), Path(target)
@@ -176,6 +181,9 @@ def denoise_file(
     noise = noise_of(raw, profile, iso, source)
     if iso is not None and not raw.iso > 0:
         raw = replace(raw, iso=iso)
+    if mend_hot_pixels:
+        raw, hot = without_hot_pixels(raw, noise.level)
+        noise = replace(noise, hot=hot)
     try:
         clean = denoise_raw(raw, model, noise.level, strength=strength, ensemble=ensemble, progress=progress)
     except FsidError as error:
@@ -200,6 +208,7 @@ def denoise_folder(
     iso: float | None = None,
     strength: float = 1.0,
     ensemble: int = 1,
+    mend_hot_pixels: bool = False,
     layout: Layout | None = None,
     skip_existing: bool = False,
     progress: Callable[[int, int], None] | None = None,
@@ -236,6 +245,7 @@ def denoise_folder(
                 iso=iso,
                 strength=strength,
                 ensemble=ensemble,
+                mend_hot_pixels=mend_hot_pixels,
                 layout=layout,
             )
         except FsidError as error:

@@ -11,6 +11,7 @@ from fsid.sensor.develop import develop, develop_linear, upright
 from fsid.sensor.dng import dng_pixel_offset, read_raw, write_dng
 from fsid.sensor.exposure import expose, exposure_rand
 from fsid.sensor.fitted_profile import profile_of
+from fsid.sensor.hot_pixels import hot_pixels, without_hot_pixels
 from fsid.sensor.light import LightLevel, dimmed, light_level
 from fsid.sensor.mosaic import bayer_crop, bayer_flip, mosaic, pack, unpack
 from fsid.sensor.noise import add_noise, level_rand, variance
@@ -64,6 +65,7 @@ __all__ = [
     "far_extrapolated",
     "fit_noise",
     "from_dn",
+    "hot_pixels",
     "level_rand",
     "light_level",
     "linear_to_camera",
@@ -88,5 +90,6 @@ __all__ = [
     "unprocess",
     "upright",
     "variance",
+    "without_hot_pixels",
     "write_dng",
 ]
