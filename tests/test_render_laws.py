@@ -10,6 +10,7 @@ from scipy.ndimage import binary_erosion
 
 from fsid.assets import Mesh
 from fsid.render import Renderer
+from fsid.render.camera import lens_of
 from fsid.render.drawable import BACKGROUND_ID, Drawable, background_drawable
 from fsid.render.shadows import Source, Tile, plan_shadows
 from fsid.scene.model import Background, Camera, Light, Sky, Transform
@@ -64,6 +65,22 @@ def test_a_closed_white_room_is_a_white_furnace(renderer: Renderer) -> None:
     expected = 0.7 * np.array([[0.8, 0.4, 0.1]])
     np.testing.assert_allclose(frame.radiance[middle] / expected, 1.0, rtol=2e-3)
     assert (frame.radiance[inside] <= expected * 1.002 + 1e-6).all()
+
+
+@pytest.mark.parametrize("fov_deg", [45.0, 28.0])
+def test_a_longer_lens_sees_no_more_shade_at_the_foot_of_a_wall(renderer: Renderer, fov_deg: float) -> None:
+    """What occludes is looked for in a part of the image: what that cuts off counts as open."""
+    wall = lambertian(block((3.0, 0.2, 1.0)), at=Transform((0.0, 0.1, 0.0), NO_TURN, ONE), object_id=1)
+    foot, closed = np.array([0.0, -0.06, 0.0]), []
+    for fov in (72.0, fov_deg):
+        camera = Camera((0.0, -1.2, 1.2), (0.0, -0.1, 0.0), (0.0, 0.0, 1.0), fov, 384, 384)
+        lens = lens_of(camera)
+        x, y, z = lens.rotation @ (foot - lens.position)
+        row, column = int(192 - 192 * lens.focal[1] * y / z), int(192 + 192 * lens.focal[0] * x / z)
+        frame = draw(renderer, view(lambertian(grid(6.0)), wall, ambient=1.0, camera=camera))
+        closed.append(1 - frame.radiance[row, column, 0] / 0.5)
+    assert closed[0] > 0.5
+    assert 0.7 * closed[0] < closed[1] < 1.1 * closed[0]
 
 
 @pytest.mark.parametrize("roughness", [20, 60, 100])

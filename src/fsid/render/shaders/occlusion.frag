@@ -17,7 +17,7 @@ uniform int taps;
 OUTPUT(0, rgba32f, result);
 
 const float RADIUS_M = 0.35;
-const float MAX_SCREEN = 0.2;   // of the image width
+const float MAX_SCREEN = 0.2;   // of the image width; what lies beyond counts as open
 const float GOLDEN_ANGLE = 2.3999632;
 const vec2 TURN = vec2(cos(4.0 * GOLDEN_ANGLE), sin(4.0 * GOLDEN_ANGLE));   // from a tap to the next of its spiral
 
@@ -36,7 +36,8 @@ void main() {
     bool hit = z > 0.0;
     vec3 p = vec3(vec2(block) * per_block + corner, 1.0) * z;
     vec3 n = axes * unpack_direction(FETCH(samples, block * stride + stride / 2).y);
-    float reach = min(0.5 * RADIUS_M * focal.x / max(z, 1e-3), MAX_SCREEN) * float(size.x);
+    float whole = 0.5 * RADIUS_M * focal.x / max(z, 1e-3), reached = min(MAX_SCREEN / whole, 1.0);
+    float reach = reached * whole * float(size.x);
     float r2 = RADIUS_M * RADIUS_M, sum = 0.0;
     float floor_m = 0.004 + 0.003 * z;
     int spiral = (block.x & 1) + 2 * (block.y & 1);
@@ -53,6 +54,6 @@ void main() {
         float vv = dot(v, v), f = max(r2 - vv, 0.0);
         sum += other_z > 0.0 ? f * f * f * max(dot(v, n) - floor_m, 0.0) / (vv + 0.0004) : 0.0;
     } while (++i < count);
-    float covered = sum * 5.0 * RADIUS_M / (r2 * r2 * r2 * float(taps));
+    float covered = reached * sum * 5.0 * RADIUS_M / (r2 * r2 * r2 * float(taps));
     WRITE(result, block, hit ? vec4(max(1.0 - covered, 0.1), z, 0, 0) : vec4(1, 0, 0, 0));
 }
