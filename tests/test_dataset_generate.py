@@ -43,7 +43,7 @@ from fsid.dataset.sample import Sample
 from fsid.dataset.shards import read_samples
 from fsid.dataset.worker import Worker
 from fsid.errors import FsidError
-from fsid.sensor import NoiseTerms, load_profile, save_profile
+from fsid.sensor import NoiseTerms, load_profile, read_raw, save_profile
 from fsid.sensor.light import LONGEST_EXPOSURE_S
 
 SMALL = ["width=128", "height=96"]
@@ -315,6 +315,17 @@ def test_dark_current_flows_for_the_longest_exposure(photos: Path, tmp_path: Pat
     assert not {"exposure_s", "unit"} & without.record.keys()
     brighter = np.mean(sample.noisy.mosaic - without.noisy.mosaic)
     assert brighter == pytest.approx(100 * np.mean(sample.record["k"]), rel=0.05)
+
+
+def test_noise_without_rounding_is_not_rounded_by_its_file(photos: Path, tmp_path: Path):
+    """The file rounded it to the camera's DN: the dark of low ISO had 1.4 times the stated variance."""
+    cameras = with_terms(tmp_path / "fine.yaml", NoiseTerms(quantisation=False))
+    sample = make_sample(small(f"images={photos}", cameras), 0, 0, None)
+    stored = read_raw(io.BytesIO(encode(sample)["noisy.dng"]))
+    assert (stored.black_level, stored.white_level) == (64 * 64, 64 * 1023)
+    assert sample.record["white_level"] == stored.white_level
+    inside = (sample.noisy.mosaic > -64 / 959) & (sample.noisy.mosaic < 1)
+    np.testing.assert_allclose(stored.mosaic[inside], sample.noisy.mosaic[inside], rtol=0, atol=0.51 / 61376)
 
 
 def test_photographs_are_the_same_data_whatever_scenes_would_be(photos: Path, tmp_path: Path):

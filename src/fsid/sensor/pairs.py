@@ -20,7 +20,7 @@ from fsid.sensor.exposure import expose
 from fsid.sensor.mosaic import mosaic
 from fsid.sensor.noise import add_noise, before_converter
 from fsid.sensor.profiles import CameraProfile
-from fsid.sensor.quantise import quantise
+from fsid.sensor.quantise import clean_levels, quantise
 from fsid.sensor.raw import NoiseLevel, Raw
 from fsid.sensor.terms import PAPER, NoiseTerms, add_noise_terms
 from fsid.sensor.unprocess import check_linear, check_srgb, linear_to_camera, unprocess
@@ -90,7 +90,8 @@ def noisy_from_clean(
 ) -> Raw:
     """One stored exposure of `clean` at `level`: noise, then the camera's own rounding and clipping.
 
-    clean: with the camera's levels, to which it is rounded; those of a clean DNG are 64 times finer.
+    clean: with the camera's levels, to which it is rounded; those of a clean DNG are 64 times finer. Where
+    the terms leave out rounding, the result has these finer levels, and a file does not round it either.
     terms, unit, exposure_s: what the camera does beyond the paper's model; see `terms`.
     """
     injected = before_converter(level, clean.white_level - clean.black_level) if terms.quantisation else level
@@ -98,7 +99,7 @@ def noisy_from_clean(
         noisy = add_noise(rng, clean, injected)
     else:
         noisy = add_noise_terms(rng, clean, injected, terms, unit=unit, exposure_s=exposure_s)
-    return replace(quantise(noisy) if terms.quantisation else noisy, iso=iso, noise=level)
+    return replace(quantise(noisy) if terms.quantisation else clean_levels(noisy), iso=iso, noise=level)
 
 
 def _raw(x: np.ndarray, matrix: np.ndarray, gains: tuple[float, float, float], profile: CameraProfile) -> Raw:

@@ -8,7 +8,7 @@
     drift              black level from frame to frame, in read-noise sigmas
     dark_current_e_s   electrons per second and pixel: light that is not there, with its own shot noise
     defective          share of pixels that show any value but theirs
-    quantisation       False leaves the noisy image unrounded
+    quantisation       False leaves the noisy image unrounded, with the fine levels of a clean one
 
 row, column and tail say how sigma2 is made up, so Var(x) = k x + sigma2 over time holds with them too. fixed,
 prnu and defective do not vary over time. `NoiseTerms()` is the paper's model. Each term draws from its own
