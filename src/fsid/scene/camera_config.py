@@ -20,7 +20,7 @@ class CameraConfig:
     elevation_deg: Range = knob((2.0, 55.0), 0.0, 88.0)
     """Angle above the horizon seen from the focus: low views see walls and horizon, high ones the ground."""
     fov_deg: Range = knob((28.0, 72.0), 5.0, 150.0)
-    """Horizontal field of view."""
+    """Horizontal field of view, before distortion."""
     roll_deg: float = knob(2.5, 0.0, 180.0)
     """Standard deviation of the camera's roll."""
     skyward_share: float = knob(0.5, 0.0, 1.0)

@@ -134,7 +134,7 @@ class LightConfig:
     ambient_share: Range = knob((1.5, 6.0), 1e-4, 10.0)
     """Irradiance from the surroundings relative to that from the lights; log-uniform."""
     sun_share: float = knob(0.6, 0.0, 1.0)
-    """Share of open-air scenes with sunlight; the others have an overcast sky or, by `night_share`, lamps."""
+    """Share with sunlight of those open-air scenes that `night_share` leaves in daylight; else overcast."""
     night_share: float = knob(0.1, 0.0, 1.0)
     """Share of open-air scenes lit by lamps under the sky of dusk, about as bright as what they light."""
     sun_to_sky: Range = knob((0.5, 3.0), 0.01, 100.0)
