@@ -30,7 +30,7 @@ from fsid.dataset.tasks import SceneRenderer, check_cameras, check_task
 from fsid.dataset.worker import Worker
 from fsid.errors import FsidError
 from fsid.files import held
-from fsid.sensor import load_bayer_profile
+from fsid.sensor import CameraProfile, load_bayer_profile
 from fsid.sensor.profiles import profiles_digest
 
 SHARD_SIZE = 16
@@ -170,7 +170,7 @@ def pairs_to_make(out: Path, dataset: DatasetConfig, count: int) -> tuple[int, i
 def dataset_config(config: GenerateConfig, seed: int, shard_size: int = 0) -> DatasetConfig:
     """The identity of the dataset of (config, seed); FsidError where what it names does not exist."""
     for camera in config.cameras:
-        load_bayer_profile(camera)
+        _check_noise(load_bayer_profile(camera), config.iso_range[1])
     check_cameras(config)
     scene = config.scene
     for folder in (*scene.mesh_folders, *scene.texture_folders, scene.hdri_folder):
@@ -192,6 +192,17 @@ def dataset_config(config: GenerateConfig, seed: int, shard_size: int = 0) -> Da
     digest = pictures_digest(pictures) if pictures else ""
     noise = profiles_digest(config.cameras)
     return DatasetConfig(seed, shard_size, config, len(pictures), digest, noise)
+
+
+def _check_noise(profile: CameraProfile, highest_iso: float) -> None:
+    """FsidError where noise is more than the white level; up there it would end the run that draws it."""
+    try:
+        profile.level(highest_iso).check()
+    except FsidError:
+        raise FsidError(
+            f"iso_range: at ISO {highest_iso:g} the noise of {profile.name} exceeds the white level; "
+            "take a lower ISO"
+        ) from None
 
 
 @contextmanager
