@@ -158,6 +158,19 @@ def test_read_noise_that_another_conversion_gain_lowers_is_kept():
     np.testing.assert_allclose(_sigma2_dn2(replace(found, measured=None), isos), [1.4, 3.6, 3.6, 5.0])
 
 
+def test_between_isos_of_one_conversion_gain_noise_follows_its_law_beside_another_one():
+    """A cubic through both levels out where they meet: 75 % too high at ISO 400, 29 % too low at 6400."""
+    isos, floor_dn2 = 200.0 * 4 ** np.arange(6), 0.3
+    switched_dn2 = np.where(isos < 1000, 2e-5, 1e-6) * isos**2 + floor_dn2
+    found = _calibrated(switched_dn2, 0.005 * switched_dn2)
+    k = np.outer(0.8e-6 * isos, np.ones(4))
+    found = replace(found, iso=tuple(isos), k=k, measured=replace(found.measured, k_error=0.001 * k))
+    between = np.array([400.0, 6400.0, 25600.0, 102400.0])
+    expected = np.where(between < 800, 2e-5, 1e-6) * between**2 + floor_dn2
+    np.testing.assert_allclose(_sigma2_dn2(found, between), expected, rtol=0.1)
+    np.testing.assert_allclose(_sigma2_dn2(found, isos), switched_dn2)
+
+
 def test_read_noise_that_falls_within_its_errors_is_pooled_by_them():
     found = _calibrated([0.1, 0.5, 1.0, 0.7, 4.0], [0.001, 0.001, 0.2, 0.1, 0.1])
     pooled = (1.0 + 4 * 0.7) / 5

@@ -12,7 +12,8 @@ between two such lines), so the table is believed where it exists and the law ca
   falls;
 - where a table states standard errors, as a calibrated one does, neighbours that fall within three errors of
   their difference are pooled, weighted by their errors (Ayer et al. 1955). A fall beyond them is the
-  camera's: another conversion gain, with less read noise. It is kept, and so is all that does not fall.
+  camera's: another conversion gain, with less read noise. It is kept, and so is all that does not fall; each
+  gain has a cubic of its own, since a common one would level out at both sides of the fall.
 
 sigma2 below the rounding noise of the converter, 1/12 DN^2, is impossible for an image made of integers; a
 published table holds such values, even negative ones, when its intercepts were fitted without that bound.
@@ -24,10 +25,11 @@ Results are continuous in ISO, never below the floor, and monotone but for such 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.polynomial.polynomial import polyval
-from scipy.interpolate import PchipInterpolator
+from scipy.interpolate import PchipInterpolator, PPoly
 from scipy.optimize import nnls
 
 RELATIVE_ERROR = 0.1  # of a published value against the law, where no absolute error dominates
@@ -46,7 +48,7 @@ class IsoCurve:
 
     first: float
     last: float
-    inside: PchipInterpolator | None
+    inside: PPoly | None
     law: np.ndarray
 
     def __call__(self, iso: float) -> np.ndarray:
@@ -91,14 +93,28 @@ def sigma2_law(iso: np.ndarray, sigma2: np.ndarray, floor: float, error: float) 
     return _nonnegative_fit(iso, sigma2 - floor, powers=(2, 0, 1), error=max(error, floor))
 
 
-def _inside(iso: np.ndarray, values: np.ndarray, error: np.ndarray | None) -> PchipInterpolator | None:
+def _inside(iso: np.ndarray, values: np.ndarray, error: np.ndarray | None) -> PPoly | None:
     if len(iso) == 1:
         return None
     if error is None:
         believed = _rising(values)
     else:
         believed = np.stack([_pooled(*site) for site in zip(values.T, error.T, strict=True)], axis=1)
-    return PchipInterpolator(np.log(iso), np.log(believed))
+    return _cubics(np.log(iso), np.log(believed))
+
+
+def _cubics(x: np.ndarray, y: np.ndarray) -> PPoly:
+    """Through y (n, 4) over x (n,), n > 1: a monotone cubic from fall to fall of a site, a fall straight."""
+    coefficients = np.zeros((4, len(x) - 1, y.shape[1]))
+    for site, values in enumerate(y.T):
+        slopes = np.diff(values) / np.diff(x)
+        falls = np.flatnonzero(slopes < 0)
+        coefficients[2:, falls, site] = slopes[falls], values[falls]
+        for first, last in pairwise((0, *(falls + 1), len(x))):
+            if last - first > 1:
+                cubic = PchipInterpolator(x[first:last], values[first:last])
+                coefficients[:, first : last - 1, site] = cubic.c
+    return PPoly(coefficients, x)
 
 
 def _rising(values: np.ndarray) -> np.ndarray:
