@@ -20,6 +20,8 @@ from fsid.sensor import (
     to_dn,
     write_dng,
 )
+from fsid.sensor.calibrate import NoiseFit
+from fsid.sensor.fitted_profile import profile_of, site_blacks
 from fsid.sensor.frames import find_frames
 from fsid.sensor.mosaic import site_offsets
 from stated_black import state_black
@@ -329,6 +331,19 @@ def test_sites_of_noisy_dark_frames_are_not_told_apart_by_chance(tmp_path, rng):
     found = calibrate(lit, name="x", dark=dark, layout=layout)
     assert np.ptp(found.fits[0].black) > 0.5
     assert not any("sites differ" in note for note in found.notes)
+
+
+def test_the_black_level_is_that_of_the_isos_that_show_it_best():
+    """At ISO 102400 of 16 bits it is uncertain by 5 DN, at ISO 100 by a thirtieth."""
+
+    def fit(sigma2_dn2, black):
+        dn, error = np.full(4, sigma2_dn2), np.ones(4)
+        return NoiseFit(error, dn, 0.01 * error, 0.01 * dn, np.array(black), ())
+
+    fits = {100.0: fit(66.0, [1024.0] * 4), 102400.0: fit(2e6, [1034.0, 1021.0, 1027.0, 1013.0])}
+    np.testing.assert_allclose(site_blacks(list(fits.values())), 1024, atol=0.01)
+    fits[102400.0] = fit(2e6, [1033.0] * 4)
+    assert profile_of(fits, name="x", cfa="RGGB", white_level=65535).black_level == 1024
 
 
 def test_sites_of_other_black_levels_are_measured_stated_and_kept(tmp_path, rng):

@@ -30,7 +30,7 @@ from fsid.sensor.calibrate import (
     pool_dark,
 )
 from fsid.sensor.camera_profile import CameraProfile
-from fsid.sensor.fitted_profile import profile_of
+from fsid.sensor.fitted_profile import profile_of, site_blacks
 from fsid.sensor.frames import Frame, FrameSet, Layout, bursts, find_frames
 from fsid.sensor.temporal import TemporalStatistics
 from fsid.sensor.terms_fit import CUT_OFF, DarkFinding, dark_finding, fit_terms, prnu_of, shortest_dark
@@ -276,7 +276,7 @@ def _notes(reader: _Reader, isos: Sequence[float], fits: Sequence[NoiseFit]) -> 
     for stated, measured, path in reader.blacks:
         source = "--black-level" if reader.found.camera.bare else "the files' black level"
         yield f"{path}: dark frames have a mean of {measured:.1f} DN, {source} is {stated}, which is kept"
-    black = np.mean([fit.black for fit in fits], axis=0)
+    black = site_blacks(fits)
     read_dn = min(float(np.sqrt(fit.sigma2_dn.mean())) for fit in fits)
     apart_dn = max(SITES_APART_DN, SITES_APART_SIGMA * read_dn)
     if reader.found.camera.bare and np.ptp(black) > apart_dn:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from fsid.errors import FsidError
 from fsid.sensor.calibrate import NoiseFit
 from fsid.sensor.camera_profile import MONO, CameraProfile, Measurement
 from fsid.sensor.colour import published_matrices
-from fsid.sensor.quantise import check_levels
+from fsid.sensor.quantise import ROUNDING_DN2, check_levels
 
 _METHOD = "fsid calibrate: weighted line through pooled temporal variances per CFA site (sensor/calibrate.py)"
 
@@ -35,7 +35,7 @@ def profile_of(
 ) -> CameraProfile:
     """The profile `name` of the lines that `fit_noise` found, by ISO, for frames that no file holds.
 
-    cfa: None or "MONO" for a monochrome sensor. black_level: DN; the mean of the fits' where None. frames,
+    cfa: None or "MONO" for a monochrome sensor. black_level: DN, None for the mean of `site_blacks`. frames,
     dark_frames: how many the lines are from, by ISO; 0 where not stated. FsidError: no fit,
     an ISO that is none, or a white level not above the black level.
     """
@@ -43,7 +43,7 @@ def profile_of(
     if not isos or not all(0 < iso < math.inf for iso in isos):
         raise FsidError(f"a profile needs fits by ISO, numbers above 0; got {isos}")
     each = [fits[iso] for iso in isos]
-    black = round(float(np.mean([fit.black for fit in each]))) if black_level is None else black_level
+    black = round(float(site_blacks(each).mean())) if black_level is None else black_level
     check_levels(black, white_level, f"profile {name}")
     span = white_level - black
 
@@ -72,3 +72,9 @@ def profile_of(
             dark_frames=tuple((dark_frames or {}).get(iso, 0) for iso in isos),
         ),
     )
+
+
+def site_blacks(fits: Sequence[NoiseFit]) -> np.ndarray:
+    """(4,) or (1,) DN: the black level of each site, a mean over ISOs that counts them by 1 / sigma2."""
+    sure = [1 / max(float(np.mean(fit.sigma2_dn)), ROUNDING_DN2) for fit in fits]
+    return np.average([fit.black for fit in fits], axis=0, weights=sure)
