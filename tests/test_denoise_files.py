@@ -370,30 +370,30 @@ def test_a_layout_that_a_profile_contradicts_is_said(
     tmp_path: Path, network: Path, capsys: pytest.CaptureFixture[str], refused: Callable[..., str]
 ) -> None:
     measured = Measurement(
-        k_error=np.full((1, 4), 1e-5),
-        sigma2_error=np.full((1, 4), 1e-7),
-        black=np.array([[60.0, 66.0, 64.0, 70.0]]),
-        frames=(20,),
-        dark_frames=(10,),
+        k_error=np.full((2, 4), 1e-5),
+        sigma2_error=np.full((2, 4), 1e-7),
+        black=np.array([[60.0, 66.0, 64.0, 70.0], [64.0, 63.0, 66.0, 68.0]]),  # the second by much noise
+        frames=(20, 20),
+        dark_frames=(10, 10),
     )
-    level = PROFILE.level(800)
-    k, sigma2 = np.array([level.k]), np.array([level.sigma2])
-    mine = replace(PROFILE, name="mine", iso=(800,), k=k, sigma2=sigma2, measured=measured)
+    levels = [PROFILE.level(iso) for iso in (800, 25600)]
+    k, sigma2 = (np.array([getattr(level, name) for level in levels]) for name in ("k", "sigma2"))
+    mine = replace(PROFILE, name="mine", iso=(800, 25600), k=k, sigma2=sigma2, measured=measured)
     save_profile(tmp_path / "mine.yaml", mine)
     np.save(tmp_path / "a.npy", to_dn(noisy_raw()))
     command = ["denoise", str(tmp_path / "a.npy"), str(tmp_path / "a.dng"), "--model", str(network)]
     command += ["--profile", str(tmp_path / "mine.yaml"), "--iso", "800"]
     own = ["--cfa", PROFILE.cfa, "--white-level", "1023"]
-    for levels, is_said in (("65", True), ("60,66,64,70", False)):
-        main([*command, *own, "--black-level", levels])
+    for black, is_said in (("65", True), ("60,66,64,70", False)):
+        main([*command, *own, "--black-level", black])
         said = capsys.readouterr().err
         assert ("without --black-level 60,66,64,70" in said) == is_said
         assert "was measured on frames of" not in said
     for cfa, white, what in (("BGGR", "1023", "--cfa BGGR"), (PROFILE.cfa, "4095", "--white-level 4095")):
         main([*command, "--cfa", cfa, "--white-level", white, "--black-level", "60,66,64,70"])
         assert f"note: {what}: profile {tmp_path / 'mine.yaml'} was measured on" in capsys.readouterr().err
-    for levels in ("60,66", "60;66", ""):
-        assert "--black-level" in refused(*command, *own, "--black-level", levels)
+    for black in ("60,66", "60;66", ""):
+        assert "--black-level" in refused(*command, *own, "--black-level", black)
 
 
 def test_an_unreadable_file_is_left_out_of_a_folder(

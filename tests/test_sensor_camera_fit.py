@@ -341,7 +341,9 @@ def test_the_black_level_is_that_of_the_isos_that_show_it_best():
         return NoiseFit(error, dn, 0.01 * error, 0.01 * dn, np.array(black), ())
 
     fits = {100.0: fit(66.0, [1024.0] * 4), 102400.0: fit(2e6, [1034.0, 1021.0, 1027.0, 1013.0])}
-    np.testing.assert_allclose(site_blacks(list(fits.values())), 1024, atol=0.01)
+    black = np.array([each.black for each in fits.values()])
+    found = site_blacks(black, np.array([each.sigma2_dn for each in fits.values()]))
+    np.testing.assert_allclose(found, 1024, atol=0.01)
     fits[102400.0] = fit(2e6, [1033.0] * 4)
     assert profile_of(fits, name="x", cfa="RGGB", white_level=65535).black_level == 1024
 

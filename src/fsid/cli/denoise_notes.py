@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 def note_other_frames(layout: Layout, profile: str | None, *, quiet: bool) -> None:
     """Lines where what is stated is not what the frames had from which the camera was calibrated."""
     from fsid.sensor import load_bayer_profile
-    from fsid.sensor.camera_fit import SITES_APART_DN
+    from fsid.sensor.camera_fit import apart_dn
+    from fsid.sensor.fitted_profile import site_blacks
 
     camera = None if profile is None else load_bayer_profile(profile)
     if camera is None or camera.measured is None or layout.black_level is None:
@@ -31,9 +32,10 @@ def note_other_frames(layout: Layout, profile: str | None, *, quiet: bool) -> No
         line = f"--white-level {layout.white_level}: {measured} {camera.white_level}"
         note(f"{line}; of such a frame the noise is taken for another than it is", quiet=quiet)
         return
-    black = camera.measured.black.mean(axis=0)
-    if np.abs(black - np.asarray(layout.black_level)).max() > SITES_APART_DN:
-        levels = ",".join(f"{level:.4g}" for level in black)
+    sigma2_dn = camera.sigma2 * camera.span**2
+    black = site_blacks(camera.measured.black, sigma2_dn)
+    if np.abs(black - np.asarray(layout.black_level)).max() > apart_dn(sigma2_dn):
+        levels = ",".join(f"{round(level, 1):g}" for level in black.tolist())
         line = f"without --black-level {levels}, as profile {profile} measured, a cast stays"
         note(line, quiet=quiet)
 

@@ -259,6 +259,12 @@ def _check_above(stats: TemporalStatistics, black: float, white: int, path: Path
         )
 
 
+def apart_dn(sigma2_dn: np.ndarray) -> float:
+    """DN between black levels beyond which a cast is seen in the dark; sigma2_dn: (n, sites) of all ISOs."""
+    read_dn2 = max(float(np.mean(sigma2_dn, axis=1).min()), 0.0)
+    return max(SITES_APART_DN, SITES_APART_SIGMA * read_dn2**0.5)
+
+
 def _notes(reader: _Reader, isos: Sequence[float], fits: Sequence[NoiseFit]) -> Iterator[str]:
     if unmatched := {frame.iso for frame in reader.found.dark} - set(isos):
         yield f"dark frames of ISO {', '.join(f'{i:g}' for i in sorted(unmatched))} have no bursts: unused"
@@ -276,10 +282,9 @@ def _notes(reader: _Reader, isos: Sequence[float], fits: Sequence[NoiseFit]) -> 
     for stated, measured, path in reader.blacks:
         source = "--black-level" if reader.found.camera.bare else "the files' black level"
         yield f"{path}: dark frames have a mean of {measured:.1f} DN, {source} is {stated}, which is kept"
-    black = site_blacks(fits)
-    read_dn = min(float(np.sqrt(fit.sigma2_dn.mean())) for fit in fits)
-    apart_dn = max(SITES_APART_DN, SITES_APART_SIGMA * read_dn)
-    if reader.found.camera.bare and np.ptp(black) > apart_dn:
+    sigma2_dn = np.array([fit.sigma2_dn for fit in fits])
+    black = site_blacks(np.array([fit.black for fit in fits]), sigma2_dn)
+    if reader.found.camera.bare and np.ptp(black) > apart_dn(sigma2_dn):
         levels = ",".join(f"{round(level, 1):g}" for level in black.tolist())
         yield f"the black levels of the sites differ: denoise such mosaics with --black-level {levels}"
     for iso in sorted(set(reader.cut_off)):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -43,7 +43,8 @@ def profile_of(
     if not isos or not all(0 < iso < math.inf for iso in isos):
         raise FsidError(f"a profile needs fits by ISO, numbers above 0; got {isos}")
     each = [fits[iso] for iso in isos]
-    black = round(float(site_blacks(each).mean())) if black_level is None else black_level
+    found = site_blacks(np.array([fit.black for fit in each]), np.array([fit.sigma2_dn for fit in each]))
+    black = round(float(found.mean())) if black_level is None else black_level
     check_levels(black, white_level, f"profile {name}")
     span = white_level - black
 
@@ -74,7 +75,7 @@ def profile_of(
     )
 
 
-def site_blacks(fits: Sequence[NoiseFit]) -> np.ndarray:
-    """(4,) or (1,) DN: the black level of each site, a mean over ISOs that counts them by 1 / sigma2."""
-    sure = [1 / max(float(np.mean(fit.sigma2_dn)), ROUNDING_DN2) for fit in fits]
-    return np.average([fit.black for fit in fits], axis=0, weights=sure)
+def site_blacks(black: np.ndarray, sigma2_dn: np.ndarray) -> np.ndarray:
+    """(sites,) DN: black levels (n, sites) of n ISOs, averaged by what noise sigma2_dn (n, sites) leaves."""
+    noise_dn2 = np.maximum(np.mean(sigma2_dn, axis=1), ROUNDING_DN2)
+    return np.asarray(np.average(black, axis=0, weights=1 / noise_dn2))
