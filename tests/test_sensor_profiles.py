@@ -10,9 +10,12 @@ import pytest
 
 from fsid.cli.iso_notes import note_extrapolation
 from fsid.errors import FsidError
+from fsid.evaluate.testset import levels_of
 from fsid.sensor import CameraProfile, far_extrapolated, load_profile, profile_names, save_profile
 from fsid.sensor.camera_profile import Measurement
+from fsid.sensor.fit_plot import profile_picture
 from fsid.sensor.iso_law import k_curve, k_law, sigma2_law
+from fsid.sensor.light import light_level
 
 PUBLISHED = {
     "pixel6": "pixel6/main",
@@ -368,6 +371,17 @@ def test_a_profile_travels_to_workers():
 def test_iso_must_be_positive(iso):
     with pytest.raises(FsidError, match="ISO"):
         load_profile("pixel6").level(iso)
+
+
+def test_an_iso_of_more_noise_than_white_is_named():
+    """Of noise alone nobody knows which ISO it is of, and of an ISO not at how little light."""
+    pixel = load_profile("pixel6")
+    with pytest.raises(FsidError, match=r"^profile pixel6: ISO 1e\+06 is too high: k would be 0.74"):
+        pixel.level(1e6)
+    with pytest.raises(FsidError, match=r"^0\.01lux: profile pixel6: ISO 772144 is too high"):
+        levels_of(pixel, (), (0.5, 0.01))
+    assert light_level(pixel, 0.01, highest_iso=np.inf).iso == pytest.approx(772144, abs=1)
+    assert profile_picture(replace(pixel, iso=(1e6,), k=[[1.0] * 4], sigma2=[[0.08] * 4]), ".png")
 
 
 def test_a_range_far_beyond_the_measured_isos_is_noted_and_two_stops_are_not(tmp_path, capsys):

@@ -187,7 +187,7 @@ class Setting(NamedTuple):
 
 
 def levels_of(profile: CameraProfile, isos: Iterable[float], luxes: Iterable[float]) -> dict[str, Setting]:
-    """The camera's setting at every level by name; FsidError where there is none or one is not positive."""
+    """The camera's setting at every level by name; FsidError where there is none, or one that cannot be."""
     isos, luxes = tuple(isos), tuple(luxes)
     if not (isos or luxes) or not all(0 < level < np.inf for level in (*isos, *luxes)):
         raise FsidError("--iso: at least one positive ISO (or --lux) is needed, and no infinite one")
@@ -197,6 +197,11 @@ def levels_of(profile: CameraProfile, isos: Iterable[float], luxes: Iterable[flo
     for lux in luxes:
         light = light_level(profile, lux, highest_iso=np.inf)
         levels[f"{lux:g}lux"] = Setting(light.iso, light.exposure_s)
+    for name, setting in levels.items():
+        try:
+            profile.level(setting.iso)
+        except FsidError as error:
+            raise FsidError(f"{name}: {error}") from None
     return levels
 
 

@@ -108,11 +108,19 @@ class CameraProfile:
         return self.white_level - self.black_level
 
     def level(self, iso: float) -> NoiseLevel:
-        """Noise at any ISO > 0, continuous in ISO; see `iso_law` for what is believed where."""
+        """Noise at any ISO > 0, continuous in ISO; see `iso_law` for what is believed where.
+
+        FsidError: an ISO that is none, or one of so much noise that its variance is beyond the white level.
+        """
         if not (np.isfinite(iso) and iso > 0):
             raise FsidError(f"profile {self.name}: ISO {iso} is not a positive number")
-        k, sigma2 = self.curves
-        return NoiseLevel(k=four(k(iso)), sigma2=four(sigma2(iso)))
+        k, sigma2 = (curve(iso) for curve in self.curves)
+        if max(k.max(), sigma2.max()) > 1:
+            raise FsidError(
+                f"profile {self.name}: ISO {iso:g} is too high: k would be {k.max():.2g} and sigma2 "
+                f"{sigma2.max():.2g}, where 1 is the white level"
+            )
+        return NoiseLevel(k=four(k), sigma2=four(sigma2))
 
     @cached_property
     def curves(self) -> tuple[IsoCurve, IsoCurve]:

@@ -83,13 +83,13 @@ def profile_picture(profile: CameraProfile, suffix: str) -> bytes:
 def plot_levels(k_axes: Axes, sigma2_axes: Axes, profile: CameraProfile) -> None:
     """k and sigma2 over ISO: the table of the profile as symbols, what `level` makes of it as lines."""
     iso = np.geomspace(min(profile.iso) / 1.4, max(profile.iso) * 2, 200)
-    levels = [profile.level(value) for value in iso]
+    k_curve, sigma2_curve = ([curve(value) for value in iso] for curve in profile.curves)
     none = np.full_like(profile.k, np.nan)
     measured = profile.measured
     k_error, sigma2_error = (none, none) if measured is None else (measured.k_error, measured.sigma2_error)
     tables = (
-        (k_axes, "k", profile.k, k_error, [level.k for level in levels]),
-        (sigma2_axes, "sigma2", profile.sigma2, sigma2_error, [level.sigma2 for level in levels]),
+        (k_axes, "k", profile.k, k_error, k_curve),
+        (sigma2_axes, "sigma2", profile.sigma2, sigma2_error, sigma2_curve),
     )
     for axes, name, table, error, curve in tables:
         for site, (label, colour) in enumerate(_sites(profile)):

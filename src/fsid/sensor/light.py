@@ -101,8 +101,8 @@ def dimmed(clean: Raw, level: LightLevel) -> Raw:
 
 def _gain(profile: CameraProfile, iso: float) -> float:
     """x of one electron at a green pixel."""
-    k = profile.level(iso).k
-    return (k[1] + k[2]) / 2
+    k = profile.curves[0](iso)
+    return float(k[1] + k[2]) / 2
 
 
 def _iso_of_gain(profile: CameraProfile, gain: float, low: float, high: float) -> float:
