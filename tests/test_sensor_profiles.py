@@ -174,6 +174,18 @@ def test_between_isos_of_one_conversion_gain_noise_follows_its_law_beside_anothe
     np.testing.assert_allclose(_sigma2_dn2(found, isos), switched_dn2)
 
 
+def test_beyond_a_table_with_two_conversion_gains_noise_follows_the_law_of_the_one_there():
+    """The law of both was a constant: two stops above, sigma2 was a quarter of what it is."""
+
+    def true_dn2(iso):
+        return np.where(iso < 1400, 8e-5, 4e-6) * iso**2 + 2.3
+
+    isos = 200.0 * 2 ** np.arange(6)
+    found = _calibrated(true_dn2(isos), 0.005 * true_dn2(isos))
+    beyond = np.array([50.0, 100.0, 12800.0, 25600.0])
+    np.testing.assert_allclose(_sigma2_dn2(found, beyond), true_dn2(beyond), rtol=0.02)
+
+
 def test_read_noise_that_falls_within_its_errors_is_pooled_by_them():
     found = _calibrated([0.1, 0.5, 1.0, 0.7, 4.0], [0.001, 0.001, 0.2, 0.1, 0.1])
     pooled = (1.0 + 4 * 0.7) / 5

@@ -12,8 +12,9 @@ between two such lines), so the table is believed where it exists and the law ca
   falls;
 - where a table states standard errors, as a calibrated one does, neighbours that fall within three errors of
   their difference are pooled, weighted by their errors (Ayer et al. 1955). A fall beyond them is the
-  camera's: another conversion gain, with less read noise. It is kept, and so is all that does not fall; each
-  gain has a cubic of its own, since a common one would level out at both sides of the fall.
+  camera's: another conversion gain, with less read noise. It is kept, and so is all that does not fall. Each
+  gain has a cubic of its own, since a common one would level out at both sides of the fall, and a law of its
+  own beyond the end of the table, since a common one finds read noise that does not grow with ISO.
 
 sigma2 below the rounding noise of the converter, 1/12 DN^2, is impossible for an image made of integers; a
 published table holds such values, even negative ones, when its intercepts were fitted without that bound.
@@ -24,6 +25,7 @@ Results are continuous in ISO, never below the floor, and monotone but for such 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -43,26 +45,29 @@ class IsoCurve:
     """Values of the four sites R, Gr, Gb, B at any ISO.
 
     first, last: ends of the table. inside: log(ISO) -> log(values) between them, None where the law alone
-    holds. law: (powers, 4) polynomial coefficients in ascending order.
+    holds. below, above: (powers, 4) polynomial coefficients of the law at both ends, in ascending order.
     """
 
     first: float
     last: float
     inside: PPoly | None
-    law: np.ndarray
+    below: np.ndarray
+    above: np.ndarray
 
     def __call__(self, iso: float) -> np.ndarray:
         """(4,) values at `iso` > 0."""
+        law = self.below if iso < self.first else self.above
         if self.inside is None:
-            return polyval(iso, self.law)
+            return polyval(iso, law)
         nearest = min(max(iso, self.first), self.last)
-        return np.exp(self.inside(np.log(nearest))) * polyval(iso, self.law) / polyval(nearest, self.law)
+        return np.exp(self.inside(np.log(nearest))) * polyval(iso, law) / polyval(nearest, law)
 
 
 def k_curve(iso: np.ndarray, k: np.ndarray, error: np.ndarray | None = None) -> IsoCurve:
     """k over ISO from a table: iso (n,) ascending, k (n, 4) > 0, error (n, 4) standard errors if known."""
-    law = np.stack([k_law(iso, site) for site in k.T], axis=1)
-    return IsoCurve(iso[0], iso[-1], _inside(iso, k, error), law)
+    believed = _believed(k, error)
+    below, above = (np.stack(laws, axis=1) for laws in _laws(k_law, iso, k, believed))
+    return IsoCurve(iso[0], iso[-1], _inside(iso, believed), below, above)
 
 
 def sigma2_curve(
@@ -75,9 +80,30 @@ def sigma2_curve(
     sigma2 = np.where(abs(sigma2 - floor) <= DIGITS * floor, floor, sigma2)
     impossible = sigma2[sigma2 < floor]
     absolute = float(np.sqrt(np.mean((impossible - floor) ** 2))) if impossible.size else 0.0
-    law = np.stack([sigma2_law(iso, site, floor, absolute) for site in sigma2.T], axis=1)
-    law[0] += floor
-    return IsoCurve(iso[0], iso[-1], None if impossible.size else _inside(iso, sigma2, error), law)
+
+    def law(iso: np.ndarray, values: np.ndarray) -> np.ndarray:
+        coefficients = sigma2_law(iso, values, floor, absolute)
+        coefficients[0] += floor
+        return coefficients
+
+    believed = _believed(sigma2, None if impossible.size else error)
+    below, above = (np.stack(laws, axis=1) for laws in _laws(law, iso, sigma2, believed))
+    return IsoCurve(iso[0], iso[-1], None if impossible.size else _inside(iso, believed), below, above)
+
+
+def _laws(
+    law: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    iso: np.ndarray,
+    values: np.ndarray,
+    believed: np.ndarray,
+) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """What `law` makes of each site of a table up to its first fall, and from its last one on."""
+    below, above = [], []
+    for site, seen in zip(values.T, believed.T, strict=True):
+        starts = (0, *(np.flatnonzero(np.diff(seen) < 0) + 1), len(iso))
+        below.append(law(iso[: starts[1]], site[: starts[1]]))
+        above.append(law(iso[starts[-2] :], site[starts[-2] :]) if len(starts) > 2 else below[-1])
+    return below, above
 
 
 def k_law(iso: np.ndarray, k: np.ndarray) -> np.ndarray:
@@ -93,14 +119,14 @@ def sigma2_law(iso: np.ndarray, sigma2: np.ndarray, floor: float, error: float) 
     return _nonnegative_fit(iso, sigma2 - floor, powers=(2, 0, 1), error=max(error, floor))
 
 
-def _inside(iso: np.ndarray, values: np.ndarray, error: np.ndarray | None) -> PPoly | None:
-    if len(iso) == 1:
-        return None
+def _believed(values: np.ndarray, error: np.ndarray | None) -> np.ndarray:
     if error is None:
-        believed = _rising(values)
-    else:
-        believed = np.stack([_pooled(*site) for site in zip(values.T, error.T, strict=True)], axis=1)
-    return _cubics(np.log(iso), np.log(believed))
+        return _rising(values)
+    return np.stack([_pooled(*site) for site in zip(values.T, error.T, strict=True)], axis=1)
+
+
+def _inside(iso: np.ndarray, believed: np.ndarray) -> PPoly | None:
+    return None if len(iso) == 1 else _cubics(np.log(iso), np.log(believed))
 
 
 def _cubics(x: np.ndarray, y: np.ndarray) -> PPoly:
