@@ -197,12 +197,9 @@ def dataset_config(config: GenerateConfig, seed: int, shard_size: int = 0) -> Da
 def _check_noise(profile: CameraProfile, highest_iso: float) -> None:
     """FsidError where noise is more than the white level; up there it would end the run that draws it."""
     try:
-        profile.level(highest_iso).check()
-    except FsidError:
-        raise FsidError(
-            f"iso_range: at ISO {highest_iso:g} the noise of {profile.name} exceeds the white level; "
-            "take a lower ISO"
-        ) from None
+        profile.level(highest_iso)
+    except FsidError as error:
+        raise FsidError(f"iso_range: {error}") from None
 
 
 @contextmanager
