@@ -41,7 +41,7 @@ _SMALLEST_PX = 22  # LibRaw takes no smaller image for a RAW
 class Noise:
     """A noise level, and in words where it came from. is_estimated: from the image itself. is_left: what was
     left by a denoiser that removed all noise, as the file states. shown: else, variance that the image shows
-    over that of a level that it contradicts (`fsid.sensor.blind.contradiction`). hot: how many
+    over that of a level that it contradicts (`fsid.sensor.blind.contradiction`). hot: how many hot or dead
     pixels were mended.
     """
 

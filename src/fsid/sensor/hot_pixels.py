@@ -16,7 +16,6 @@ import numpy as np
 
 from fsid.errors import FsidError
 from fsid.sensor.bad_pixels import mended
-from fsid.sensor.defects import TILE
 from fsid.sensor.mosaic import SITE_CHANNEL, site_offsets
 from fsid.sensor.raw import NoiseLevel, Raw
 
@@ -41,22 +40,20 @@ def hot_pixels(raw: Raw, level: NoiseLevel | None = None) -> np.ndarray:
             "the noise level of this RAW is unknown; give one (CameraProfile.level, estimate_noise)"
         )
     level.check()
-    lowest, highest = np.empty_like(raw.mosaic), np.empty_like(raw.mosaic)
-    for site in TILE:
-        lowest[site], highest[site] = _range_around(raw.mosaic[site])
-    sigma, gain = np.empty_like(raw.mosaic), np.empty_like(raw.mosaic)
+    light, noise, step = (np.empty_like(raw.mosaic) for _ in range(3))  # as grey surfaces show it
+    found = np.zeros(raw.mosaic.shape, bool)
     sites = zip(site_offsets(raw.cfa), level.k, level.sigma2, SITE_CHANNEL, strict=True)
     for (r, c), k, sigma2, channel in sites:
-        site = np.s_[r::2, c::2]
-        sigma[site] = np.sqrt(k * highest[site].clip(min=0) + sigma2)
-        gain[site] = raw.white_balance[channel]
-    step = np.maximum(raw.mosaic - highest, lowest - raw.mosaic)
-    varies = highest - lowest - _BY_NOISE * sigma
-    found = (step > _FAR * sigma) & (step > _DETAIL * varies)
+        site, gain = np.s_[r::2, c::2], raw.white_balance[channel]
+        plane = raw.mosaic[site]
+        lowest, highest = _range_around(plane)
+        sigma = np.sqrt(k * highest.clip(min=0) + sigma2)
+        beyond = np.maximum(plane - highest, lowest - plane)
+        found[site] = beyond > np.maximum(_FAR * sigma, _DETAIL * (highest - lowest - _BY_NOISE * sigma))
+        light[site], noise[site], step[site] = gain * plane, gain * sigma, gain * beyond
     rows, columns = np.nonzero(found)
-    light, noise = (np.pad(plane * gain, _REACH, mode="reflect") for plane in (raw.mosaic, sigma))
-    alone = _is_alone(light, noise, (step * gain)[rows, columns], rows + _REACH, columns + _REACH)
-    found[rows, columns] = alone
+    light, noise = (np.pad(plane, _REACH, mode="reflect") for plane in (light, noise))
+    found[rows, columns] = _is_alone(light, noise, step[rows, columns], rows + _REACH, columns + _REACH)
     return found
 
 
