@@ -97,11 +97,10 @@ def read_header(path: str | Path) -> RawHeader:
     """Camera, ISO, exposure time and date of a RAW file, without its pixels. Errors as in `read_raw`."""
     with _opened(Path(path)) as (file, source):
         tags = source.values
-        other = getattr(file, "other", None)  # rawpy 0.25 and later
         return RawHeader(
             camera=dng_tags.camera_name(tags),
             iso=_iso(file, tags),
-            exposure_s=dng_tags.exposure_time_s(tags) or float(getattr(other, "shutter_speed", 0.0)),
+            exposure_s=dng_tags.exposure_time_s(tags) or float(file.other.shutter_speed),
             date=dng_tags.date_taken(tags) or taken(file)[:10].replace(":", "-"),
         )
 
@@ -348,7 +347,7 @@ def _white_balance(file: rawpy.RawPy) -> tuple[float, float, float]:
 
 
 def _iso(file: rawpy.RawPy, tags: dict[int, Values]) -> float:
-    return dng_tags.iso_speed(tags) or float(getattr(getattr(file, "other", None), "iso_speed", 0.0))
+    return dng_tags.iso_speed(tags) or float(file.other.iso_speed)
 
 
 def _xyz_to_camera(file: rawpy.RawPy, tags: dict[int, Values], path: Path) -> np.ndarray:

@@ -12,7 +12,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+
+import rawpy
 
 from fsid.sensor.tiff import ASCII, RATIONAL, SHORT, Tag, rationals
 
@@ -123,22 +124,21 @@ def exposure_metadata(
     return Metadata((Tag(ORIENTATION, SHORT, (orientation,)),), (), tuple(exif))
 
 
-def libraw_metadata(file: Any) -> Metadata:
-    """What LibRaw says of a file that is no TIFF; a rawpy before 0.25 knows the orientation only."""
-    other, lens = getattr(file, "other", None), getattr(file, "lens", None)
+def libraw_metadata(file: rawpy.RawPy) -> Metadata:
+    """What LibRaw says of a file that is no TIFF."""
     return exposure_metadata(
-        exposure_s=float(getattr(other, "shutter_speed", 0.0)),
-        f_number=float(getattr(other, "aperture", 0.0)),
-        focal_length_mm=float(getattr(other, "focal_length", 0.0)),
-        lens=str(getattr(lens, "model", "")),
+        exposure_s=float(file.other.shutter_speed),
+        f_number=float(file.other.aperture),
+        focal_length_mm=float(file.other.focal_length),
+        lens=file.lens.model,
         orientation=_ORIENTATION_OF_FLIP.get(file.sizes.flip, 1),
         taken=taken(file),
     )
 
 
-def taken(file: Any) -> str:
+def taken(file: rawpy.RawPy) -> str:
     """When LibRaw says that the picture was taken, "2026:11:21 05:00:00"; "" where it does not know."""
-    timestamp = getattr(getattr(file, "other", None), "timestamp", None)
+    timestamp = file.other.timestamp
     return f"{timestamp:%Y:%m:%d %H:%M:%S}" if timestamp is not None and timestamp.year > 1970 else ""
 
 
