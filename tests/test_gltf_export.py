@@ -95,6 +95,18 @@ def test_the_geometry_is_read_back_where_it_was():
     assert distances.max() < 2e-5
 
 
+@pytest.mark.parametrize("scale", [(1.0, 1.5, 0.7), (-1.0, 1.5, 0.7), (-1.0, -1.5, 0.7), (-1.0, -1.5, -0.7)])
+def test_faces_go_round_their_normals(scale: tuple[float, float, float]):
+    """Those of a mirrored body as well: engines shade what is seen from inside by turned normals, black."""
+    scene = small_scene()
+    scene = replace(scene, transforms=(replace(scene.transforms[0], scale=scale),))
+    surfaces = [part.surface for part in parts_of(scene, 0.0)]
+    for surface in surfaces:
+        a, b, c = (surface.vertices[surface.faces[:, i]] for i in range(3))
+        along = (np.cross(b - a, c - a) * surface.normals[surface.faces].sum(1)).sum(1)
+        assert along.sum() > 0.9 * np.abs(along).sum()
+
+
 def test_the_camera_sees_the_same():
     scene = small_scene()
     found = document(glb_bytes(scene, texture_size=64))

@@ -17,7 +17,7 @@ from fsid.scene.model import Material, Scene
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """vertices: (V, 3) metres. normals: (V, 3) unit. faces: (F, 3) int."""
+    """vertices: (V, 3) metres. normals: (V, 3) unit. faces: (F, 3) int, counterclockwise from outside."""
 
     vertices: np.ndarray
     normals: np.ndarray
@@ -50,8 +50,11 @@ def _parts(drawable: Drawable, body: str, time_s: float) -> Iterator[Part]:
     rotation, position = drawable.pose(time_s)
     normals = mesh.normals / scale
     normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    onwards = int(np.sign(scale).prod())  # -1: a mirrored triangle goes round the other way
     for number, (material, name) in enumerate(zip(drawable.materials, mesh.part_names, strict=True)):
         used, corners = np.unique(mesh.faces[mesh.face_parts == number], return_inverse=True)
         if len(used):
-            surface = Surface(mesh.vertices[used] * scale, normals[used], corners.reshape(-1, 3))
+            surface = Surface(
+                mesh.vertices[used] * scale, normals[used], corners.reshape(-1, 3)[:, ::onwards]
+            )
             yield Part(surface, rotation, position, material, drawable.object_id, body, name)
