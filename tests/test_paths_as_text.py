@@ -11,6 +11,8 @@ import pytest
 from fsid.dataset import find_photos, read_member, read_photo, save_png, shard_keys, shard_path, write_shard
 from fsid.errors import FsidError
 from fsid.evaluate import NOISY, burst_testset, compare, photo_testset, read_testset, write_results
+from fsid.render.gltf import write_glb
+from fsid.scene import SceneConfig, sample
 from fsid.sensor import Raw, calibrate, write_dng
 
 
@@ -38,6 +40,11 @@ def test_photographs_and_test_sets(photos: Path, tmp_path: Path):
     assert read_testset(root).levels == ("iso3200",)
     write_results(compare(root, [NOISY]).rows, str(tmp_path / "results.json"))
     assert (tmp_path / "results.json").is_file()
+
+
+def test_a_scene(tmp_path: Path):
+    write_glb(str(tmp_path / "scene.glb"), sample(SceneConfig(objects=(1, 1)), 1), texture_size=64)
+    assert (tmp_path / "scene.glb").read_bytes()[:4] == b"glTF"
 
 
 def test_what_is_not_there_is_named(tmp_path: Path):

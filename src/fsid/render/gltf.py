@@ -37,12 +37,12 @@ _TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 _JSON_CHUNK, _BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 
 
-def write_glb(path: Path, scene: Scene, *, texture_size: int = 512) -> None:
+def write_glb(path: Path | str, scene: Scene, *, texture_size: int = 512) -> None:
     """Write a scene as one .glb file. texture_size: texels per side of a material tile, a power of two.
 
     Raises FsidError for a scene that cannot be built, or where the file cannot be written.
     """
-    write_atomically(path, glb_bytes(scene, texture_size=texture_size))
+    write_atomically(Path(path), glb_bytes(scene, texture_size=texture_size))
 
 
 def glb_bytes(scene: Scene, *, texture_size: int = 512) -> bytes:
