@@ -12,6 +12,7 @@ from fsid.errors import FsidError
 from fsid.render.drawable import view_of
 from fsid.render.gltf import glb_bytes
 from fsid.scene import VARIANTS, Scene, SceneConfig, sample, scene_from_json, scene_to_json
+from fsid.scene.model import Sky
 
 FEW = SceneConfig(objects=(2, 4))
 
@@ -151,7 +152,14 @@ def _with(scene: Scene, key: str, value: object) -> Scene:
         ("materials.colours", ((0.5, np.nan, 0.5),) * 3),
         ("cameras.target_m", (np.inf, 0.0, 0.0)),
         ("cameras.width", 64.0),
+        ("cameras.time_s", np.nan),
+        ("cameras.exposure_s", np.inf),
+        ("cameras.aperture_m", np.inf),
+        ("cameras.colour_contrast", (0.1,)),
+        ("objects.seed", -1),
         ("ambient", (np.nan,) * 3),
+        ("sky", Sky("procedural", (1.0, 1.0, 1.0), cloudiness=np.nan)),
+        ("sky", Sky("procedural", (1.0, 1.0, 1.0), azimuth_deg=np.inf)),
     ],
 )
 def test_what_a_hand_sets_wrong_is_named(key, value):

@@ -23,6 +23,9 @@ def check_scene(scene: Scene) -> None:
         _check_camera(f"scene.cameras[{i}]", camera)
     for i, light in enumerate(scene.lights):
         _check_light(f"scene.lights[{i}]", light)
+    for i, S in enumerate(scene.objects):
+        if S.seed < 0:
+            raise FsidError(f"scene.objects[{i}].seed = {S.seed}: must not be negative")
     for i, transform in enumerate(scene.transforms):
         for name in ("position_m", "rotation_deg", "scale"):
             _check_numbers(f"scene.transforms[{i}].{name}", getattr(transform, name), 3)
@@ -34,6 +37,8 @@ def check_scene(scene: Scene) -> None:
     _check_colour("scene.ambient", scene.ambient)
     if scene.sky is not None:
         _check_colour("scene.sky.colour", scene.sky.colour)
+        for name in ("cloudiness", "azimuth_deg"):
+            _check_finite(f"scene.sky.{name}", getattr(scene.sky, name))
     for i, parts in enumerate(scene.materials):
         if isinstance(parts, Material):
             raise FsidError(f"scene.materials[{i}]: must hold one material for each part of its object")
@@ -62,6 +67,10 @@ def _check_camera(where: str, camera: Camera) -> None:
         raise FsidError(f"{where}: {camera.width}x{camera.height} pixels; at least 1x1 are needed")
     for name in ("position_m", "target_m", "up", "velocity_m_s", "spin_deg_s", "vignetting"):
         _check_numbers(f"{where}.{name}", getattr(camera, name), 3)
+    for name in ("chromatic_aberration", "colour_contrast"):
+        _check_numbers(f"{where}.{name}", getattr(camera, name), 2)
+    for name in ("time_s", "exposure_s", "aperture_m", "focus_m"):
+        _check_finite(f"{where}.{name}", getattr(camera, name))
     if not 0 < camera.fov_deg < 180:
         raise FsidError(f"{where}.fov_deg = {camera.fov_deg:g}: must lie between 0 and 180 degrees")
 
@@ -81,6 +90,11 @@ def _check_light(where: str, light: Light) -> None:
     if light.kind == "spot" and not 0 < light.cone_deg <= 360:
         raise FsidError(f"{where}.cone_deg = {light.cone_deg:g}: must be above 0, at most 360 degrees")
     _check_colour(f"{where}.colour", light.colour)
+
+
+def _check_finite(where: str, value: float) -> None:
+    if not math.isfinite(value):
+        raise FsidError(f"{where} = {value:g}: must be finite")
 
 
 def _check_numbers(where: str, values: Any, count: int) -> None:
@@ -108,8 +122,7 @@ def _check_material(where: str, material: Material) -> None:
         if not 0 <= getattr(material, name) < math.inf:
             raise FsidError(f"{where}.{name} = {getattr(material, name):g}: must be 0 or more, and finite")
     for name in ("rotation_deg", "relief_scale"):
-        if not math.isfinite(getattr(material, name)):
-            raise FsidError(f"{where}.{name} = {getattr(material, name):g}: must be finite")
+        _check_finite(f"{where}.{name}", getattr(material, name))
     if len(material.colours) != 3:
         raise FsidError(f"{where}.colours: must be three colours; got {len(material.colours)}")
     for colour in material.colours:
