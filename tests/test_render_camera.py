@@ -224,6 +224,17 @@ def test_render_gives_flow_to_another_camera(renderer: Renderer) -> None:
         renderer.render(scene, 0, flow_to=7)
 
 
+def test_a_slit_is_a_column_of_the_image(renderer: Renderer) -> None:
+    """Also one so narrow that a grid of 64 places in a row has more rows than a driver's texture."""
+    what = view(lambertian(sphere(0.3)), lights=(point_light((0.3, 0.2, 1.8)),))
+    wide, narrow = (replace(FROM_ABOVE, width=width, height=600, fov_deg=60.0) for width in (32, 2))
+    tangent = np.tan(np.radians(wide.fov_deg) / 2) * 2 / 32
+    narrow = replace(narrow, fov_deg=float(np.degrees(2 * np.arctan(tangent))))
+    whole, slit = (draw(renderer, replace(what, camera=camera)) for camera in (wide, narrow))
+    np.testing.assert_allclose(slit.depth, whole.depth[:, 15:17], rtol=1e-4)
+    np.testing.assert_allclose(slit.radiance, whole.radiance[:, 15:17], rtol=0.05)
+
+
 def test_a_still_scene_is_not_blurred(renderer: Renderer) -> None:
     what = view(lambertian(sphere(0.3)), lights=(point_light((0.3, 0.2, 1.8)),))
     sharp = draw(renderer, what).radiance

@@ -94,8 +94,9 @@ class Targets:
             gl("glClearBufferfv", c_uint, c_int, c_void_p)(_DEPTH, 0, (c_float * 1)(1.0))
 
     def begin_overview(self, width: int) -> Canvas:
-        """A grid of places, `width` of them in a row; unit 0 holds the G-buffer."""
-        height = max(1, round(width * self.seen[1] / self.seen[0]))
+        """A grid of places, `width` of them in a row, square unless the image is a slit; unit 0 holds the
+        G-buffer."""
+        height = min(max(1, round(width * self.seen[1] / self.seen[0])), self._limit)
         if not self._overview:
             texture = self._context.texture((width, height), 4, dtype="u4")
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
