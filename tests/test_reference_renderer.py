@@ -162,6 +162,15 @@ def test_what_mitsuba_cannot_do_is_said():
         ReferenceRenderer(samples=0)
 
 
+def test_what_makes_no_scene_is_said_as_by_the_rasteriser():
+    """Not drawn, of NaN, or without its sky."""
+    light = Light("point", (0.0, 0.0, np.nan), (0.0, 0.0, -1.0), (2.0, 2.0, 2.0), 0.0, 360.0)
+    with pytest.raises(FsidError, match=r"scene\.lights\[0\]\.position_m"):
+        renderer(1).render(empty_room(light))
+    with pytest.raises(FsidError, match=r"scene\.sky: a closed 'room'"):
+        renderer(1).render(replace(empty_room(), sky=Sky("procedural", (1.0, 1.0, 1.0))))
+
+
 def matt(
     family: str, colours: tuple[float, float, float], tile_m: float = 0.4, turn: float = 0.0
 ) -> Material:

@@ -119,10 +119,6 @@ def view_of(scene: Scene, camera_index: int) -> View:
     camera = camera_of(scene, camera_index)
     open_air = scene.background.kind == "open-air"
     background = background_drawable(scene.background)
-    if scene.sky is not None and not open_air:
-        raise FsidError(
-            f"scene.sky: a closed '{scene.background.kind}' lets no sky in; remove it, or use kind 'open-air'"
-        )
     panels = [
         panel_drawable(light, background.materials[0]) for light in scene.lights if light.kind == "area"
     ]

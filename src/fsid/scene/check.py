@@ -39,6 +39,11 @@ def check_scene(scene: Scene) -> None:
         _check_colour("scene.sky.colour", scene.sky.colour)
         for name in ("cloudiness", "azimuth_deg"):
             _check_finite(f"scene.sky.{name}", getattr(scene.sky, name))
+        if scene.background.kind != "open-air":
+            raise FsidError(
+                f"scene.sky: a closed '{scene.background.kind}' lets no sky in; "
+                "remove it, or use kind 'open-air'"
+            )
     for i, parts in enumerate(scene.materials):
         if isinstance(parts, Material):
             raise FsidError(f"scene.materials[{i}]: must hold one material for each part of its object")

@@ -29,7 +29,7 @@ from fsid.render.reference.dicing import View
 from fsid.render.reference.lights import emitters, surroundings
 from fsid.render.reference.variant import load_mitsuba
 from fsid.render.sharpness import set_sharpness
-from fsid.scene.check import camera_of
+from fsid.scene.check import camera_of, check_scene
 from fsid.scene.model import Camera, Scene
 from fsid.scene.vectors import vec3
 
@@ -74,6 +74,7 @@ class ReferenceRenderer:
 
     def render(self, scene: Scene, camera_index: int = 0, *, seed: int = 0) -> Frame:
         """The frame of one of the scene's cameras; `seed` changes the noise only. Raises FsidError."""
+        check_scene(scene)
         asked = camera_of(scene, camera_index)
         if asked.distortion is not None:
             raise FsidError(
