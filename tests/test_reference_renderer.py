@@ -171,6 +171,16 @@ def test_what_makes_no_scene_is_said_as_by_the_rasteriser():
         renderer(1).render(replace(empty_room(), sky=Sky("procedural", (1.0, 1.0, 1.0))))
 
 
+@pytest.mark.parametrize("seed", [-1, 42_950, 2**63])
+def test_a_seed_is_any_whole_number(seed: int):
+    """Also that of a scene, whose product with a pass's is beyond Mitsuba's 32 bits."""
+    light = Light("point", (1.0, 0.0, 1.5), (0.0, 0.0, -1.0), (2.0, 2.0, 2.0), 0.3, 360.0)
+    camera = replace(DOWN, width=8, height=8)
+    found = renderer(4).render(empty_room(light, camera=camera), seed=seed).radiance
+    assert np.isfinite(found).all()
+    assert found.std() > 0
+
+
 def matt(
     family: str, colours: tuple[float, float, float], tile_m: float = 0.4, turn: float = 0.0
 ) -> Material:

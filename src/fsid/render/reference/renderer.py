@@ -73,7 +73,8 @@ class ReferenceRenderer:
         return str(self._mi.variant())
 
     def render(self, scene: Scene, camera_index: int = 0, *, seed: int = 0) -> Frame:
-        """The frame of one of the scene's cameras; `seed` changes the noise only. Raises FsidError."""
+        """The frame of one of the scene's cameras; `seed`, any whole number, changes the noise only.
+        Raises FsidError."""
         check_scene(scene)
         asked = camera_of(scene, camera_index)
         if asked.distortion is not None:
@@ -142,7 +143,8 @@ class Prepared:
         total, done = np.zeros((self._camera.height, self._camera.width, 3)), 0
         while done < samples:
             count = min(_PASS, samples - done)
-            image = self._mi.render(self._scene, integrator=integrator, spp=count, seed=seed * 100_003 + done)
+            seed_32 = (seed * 100_003 + done) % 2**32  # Mitsuba takes no other
+            image = self._mi.render(self._scene, integrator=integrator, spp=count, seed=seed_32)
             total += np.array(image, np.float64)[..., :3] * count
             done += count
         return total / samples
