@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from types import SimpleNamespace
 
+import moderngl
 import numpy as np
 import pytest
 from scipy.ndimage import center_of_mass, map_coordinates
@@ -233,6 +234,33 @@ def test_a_slit_is_a_column_of_the_image(renderer: Renderer) -> None:
     whole, slit = (draw(renderer, replace(what, camera=camera)) for camera in (wide, narrow))
     np.testing.assert_allclose(slit.depth, whole.depth[:, 15:17], rtol=1e-4)
     np.testing.assert_allclose(slit.radiance, whole.radiance[:, 15:17], rtol=0.05)
+
+
+def test_an_image_that_the_driver_does_not_hold_is_named(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """llvmpipe allows 7680 x 4320 pixels a side, and has no framebuffer of 2 x 2 samples of them."""
+
+    def framebuffer(*images: object) -> None:
+        raise moderngl.Error("the framebuffer is not complete (INCOMPLETE_ATTACHMENT)")
+
+    what = view(lambertian(sphere(0.3)), lights=(point_light((0.3, 0.2, 1.8)),))
+    before = draw(renderer, what).radiance
+    what = replace(what, camera=replace(FROM_ABOVE, width=48, height=20))
+    targets = renderer._targets
+    small = SimpleNamespace(
+        info=targets._context.info,
+        texture=targets._context.texture,
+        depth_texture=targets._context.depth_texture,
+        framebuffer=framebuffer,
+    )
+    with monkeypatch.context() as patch:
+        patch.setattr(targets, "_context", small)
+        with pytest.raises(FsidError, match=r"48 x 20: .* smaller supersampling"):
+            draw(renderer, what)
+    assert draw(renderer, what).radiance.shape == (20, 48, 3)
+    what = replace(what, camera=FROM_ABOVE)
+    np.testing.assert_array_equal(draw(renderer, what).radiance, before)
 
 
 def test_a_still_scene_is_not_blurred(renderer: Renderer) -> None:

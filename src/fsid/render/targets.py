@@ -58,29 +58,41 @@ class Targets:
                 )
         self.release()
         self.size, self.seen, self._labels = size, seen, labels
-        context, large = self._context, (seen[0] * self._grid, seen[1] * self._grid)
-        self.blocks = (-(-seen[0] // 2), -(-seen[1] // 2))
-        self._samples = context.texture(large, 4, dtype="u4")
-        self._depth = context.depth_texture(large)
+        try:
+            self._make()
+        except moderngl.Error as error:
+            self.release()
+            raise FsidError(
+                f"image size {size[0]} x {size[1]}: this driver does not hold {self._grid} x {self._grid} "
+                "samples for each pixel of it; take fewer pixels or a smaller supersampling"
+            ) from error
+
+    def _make(self) -> None:
+        context, size, own = self._context, self.size, self._own
+        large = (self.seen[0] * self._grid, self.seen[1] * self._grid)
+        self.blocks = (-(-self.seen[0] // 2), -(-self.seen[1] // 2))
+        self._samples = own(context.texture(large, 4, dtype="u4"))
+        self._depth = own(context.depth_texture(large))
         self._depth.compare_func = ""
-        self._block_depth = context.texture(self.blocks, 2, dtype="f4")
-        self._open, self._blurred = (context.texture(self.blocks, 4, dtype="f4") for _ in range(2))
-        self._marks = make_marks(context, size, compute=self._compute)
-        self._results = [self._result()]
-        self._to_missing = Canvas(context, self._results[0].images[:1], self._marks)
-        self._to_marks = Canvas(context, [], self._marks)
-        images = [self._samples, self._depth, self._block_depth, self._open, self._blurred]
-        for texture in images:
+        self._to_samples = own(context.framebuffer([self._samples], self._depth))
+        self._block_depth = own(context.texture(self.blocks, 2, dtype="f4"))
+        self._open, self._blurred = (own(context.texture(self.blocks, 4, dtype="f4")) for _ in range(2))
+        for texture in (self._samples, self._depth, self._block_depth, self._open, self._blurred):
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        self._to_samples = context.framebuffer([self._samples], self._depth)
-        self._to_block_depth = Canvas(context, [self._block_depth])
-        self._to_open = Canvas(context, [self._open])
-        self._to_blurred = Canvas(context, [self._blurred])
-        canvases = [self._to_block_depth, self._to_open, self._to_blurred, self._to_missing, self._to_marks]
-        self._owned = [self._to_samples, *canvases, self._marks, *images]
+        self._marks = own(make_marks(context, size, compute=self._compute))
+        self._results = [self._result()]
+        self._to_missing = own(Canvas(context, self._results[0].images[:1], self._marks))
+        self._to_marks = own(Canvas(context, [], self._marks))
+        self._to_block_depth = own(Canvas(context, [self._block_depth]))
+        self._to_open = own(Canvas(context, [self._open]))
+        self._to_blurred = own(Canvas(context, [self._blurred]))
         if self._compute:
-            self._all_samples = Canvas(context, [self._samples])
-            self._owned.append(self._all_samples)
+            self._all_samples = own(Canvas(context, [self._samples]))
+
+    def _own(self, item: Any) -> Any:
+        """The item, which `release` frees."""
+        self._owned.append(item)
+        return item
 
     def begin_samples(self, *, over: bool) -> None:
         """Draw the G-buffer, from nothing; or only what lies in front of the depth that is there."""
@@ -236,7 +248,7 @@ class Targets:
 
     def release(self) -> None:
         """Free the images."""
-        for item in self._owned:
+        for item in reversed(self._owned):
             item.release()
         _release_all([*self._overview, *self._results])
         self._owned, self._results, self._overview = [], [], []
