@@ -154,6 +154,18 @@ def test_every_lobe_is_said(change: dict, extension: str):
     assert any(extension in material.get("extensions", {}) for material in found["materials"])
 
 
+def test_what_goes_through_has_the_colour_of_the_surface():
+    """As in `shaders/reflector.glsl`: without a colour of its own it is white, brighter than any leaf."""
+    found = document(glb_bytes(small_scene(replace(BRICK, translucency=0.4)), texture_size=64))
+    name = "KHR_materials_diffuse_transmission"
+    leaves = [material for material in found["materials"] if name in material.get("extensions", {})]
+    assert leaves
+    for leaf in leaves:
+        through = leaf["extensions"][name]
+        assert through["diffuseTransmissionFactor"] == 0.4
+        assert through["diffuseTransmissionColorTexture"] == leaf["pbrMetallicRoughness"]["baseColorTexture"]
+
+
 def test_the_file_holds_the_scene_itself_and_is_the_same_every_time():
     scene = small_scene()
     data = glb_bytes(scene, texture_size=64)

@@ -223,7 +223,7 @@ class _Document:
             row["normalTexture"] = relief | {"scale": material.relief_scale}
         if material.emission > 0:
             row |= {"emissiveTexture": colour, "emissiveFactor": [1.0, 1.0, 1.0]}
-        found = textures.extensions(material)
+        found = textures.extensions(material, colour)
         if found:
             self._extensions |= found.keys()
             row["extensions"] = found

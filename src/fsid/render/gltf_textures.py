@@ -110,8 +110,9 @@ def encoded(pixels: np.ndarray) -> bytes:
     return buffer.getvalue()
 
 
-def extensions(material: Material) -> dict[str, Any]:
-    """KHR extensions for the lobes beyond metallic-roughness that the material has."""
+def extensions(material: Material, colour: dict[str, Any]) -> dict[str, Any]:
+    """KHR extensions for the lobes beyond metallic-roughness that the material has. colour: its base colour,
+    a reference to a texture, which also tints what goes through."""
     out: dict[str, Any] = {}
     if material.clearcoat > 0:
         out["KHR_materials_clearcoat"] = {
@@ -125,7 +126,10 @@ def extensions(material: Material) -> dict[str, Any]:
         out["KHR_materials_ior"] = {"ior": 1.5}
         out["KHR_materials_volume"] = {"thicknessFactor": 0.005}
     if material.translucency > 0:
-        out["KHR_materials_diffuse_transmission"] = {"diffuseTransmissionFactor": material.translucency}
+        out["KHR_materials_diffuse_transmission"] = {
+            "diffuseTransmissionFactor": material.translucency,
+            "diffuseTransmissionColorTexture": colour,
+        }
     if material.emission > 0:
         out["KHR_materials_emissive_strength"] = {"emissiveStrength": material.emission}
     return out
