@@ -162,6 +162,15 @@ def test_what_mitsuba_cannot_do_is_said():
         ReferenceRenderer(samples=0)
 
 
+def test_a_picture_of_the_sky_has_nothing_to_agree_about():
+    light = np.ones((6, 8, 3), np.float32)
+    nothing = np.full((6, 8), -1, np.int32)
+    sky = Frame(light, 0 * light, light * (0, 0, 1), np.full((6, 8), np.inf, np.float32), nothing)
+    found = agreement(sky, sky)
+    assert (found.inside, found.ids_off) == (1.0, 0.0)
+    assert np.isnan([found.depth_off, found.normal_off, found.albedo_off, *found.ratio]).all()
+
+
 def test_what_makes_no_scene_is_said_as_by_the_rasteriser():
     """Not drawn, of NaN, or without its sky."""
     light = Light("point", (0.0, 0.0, np.nan), (0.0, 0.0, -1.0), (2.0, 2.0, 2.0), 0.0, 360.0)

@@ -28,7 +28,8 @@ absolute difference of a channel."""
 class Agreement:
     """inside: share of pixels that are no edges; the others are shares of those. ids_off, depth_off,
     normal_off, albedo_off: beyond TOLERANCES. ratio: (5,) percentiles 5, 25, 50, 75, 95 of the luminance of
-    the first frame over that of the second, where both are lit."""
+    the first frame over that of the second, where both are lit. NaN where there is nothing to compare, as in
+    a picture of the sky."""
 
     inside: float
     ids_off: float
@@ -48,15 +49,23 @@ def agreement(a: Frame, b: Frame) -> Agreement:
     apart = (np.abs(1 / a.depth - nearness) - 0.5 * step)[hit] / nearness[hit]
     albedo = np.abs(_mean(a.albedo) - _mean(b.albedo))[hit].max(-1)
     first, second = (_mean(frame.radiance)[hit].mean(-1) for frame in (a, b))
-    lit = np.minimum(first, second) > 0.05 * np.median(second)
+    lit = np.minimum(first, second) > 0.05 * _percentile(second, 50)
     return Agreement(
         inside=float(inside.mean()),
-        ids_off=float((a.object_id[inside] != b.object_id[inside]).mean()),
-        depth_off=float((apart > TOLERANCES["depth"]).mean()),
-        normal_off=float((cosine < np.cos(np.radians(TOLERANCES["normal_deg"]))).mean()),
-        albedo_off=float((albedo > TOLERANCES["albedo"]).mean()),
-        ratio=tuple(float(v) for v in np.percentile(first[lit] / second[lit], (5, 25, 50, 75, 95))),
+        ids_off=_share(a.object_id[inside] != b.object_id[inside]),
+        depth_off=_share(apart > TOLERANCES["depth"]),
+        normal_off=_share(cosine < np.cos(np.radians(TOLERANCES["normal_deg"]))),
+        albedo_off=_share(albedo > TOLERANCES["albedo"]),
+        ratio=tuple(_percentile(first[lit] / second[lit], percent) for percent in (5, 25, 50, 75, 95)),
     )
+
+
+def _share(found: np.ndarray) -> float:
+    return float(found.mean()) if found.size else float("nan")
+
+
+def _percentile(values: np.ndarray, percent: float) -> float:
+    return float(np.percentile(values, percent)) if values.size else float("nan")
 
 
 def _edges(frame: Frame) -> np.ndarray:
