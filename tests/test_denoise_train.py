@@ -132,6 +132,14 @@ def test_training_denoises(data: Path, tmp_path: Path) -> None:
     assert psnrs[-1] > psnrs[0]
 
 
+def test_the_history_has_the_last_steps_and_is_never_empty(data: Path, tmp_path: Path) -> None:
+    for log_every, rows in ((3, [3, 6, 8]), (100, [8])):
+        run = tmp_path / f"every{log_every}"
+        train(data, run, replace(CONFIG, log_every=log_every), quiet=True)
+        assert load_history(run)[0] == rows
+        assert load_checkpoint(run, *_prepare(Accelerator(cpu=True), CONFIG, None)).pending == []
+
+
 @pytest.mark.parametrize(
     "name", ["model.safetensors", "initial.safetensors", "mine.safetensors", "shard-0.tar"]
 )

@@ -29,8 +29,8 @@ class TrainState:
     """What changes from step to step beside weights and optimizer.
 
     step: steps done. average: exponential moving average of the weights. history: one row {step, loss, psnr,
-    learning_rate} per `log_every` steps, means since the row before. validation: one row {step, psnr_scenes,
-    ...} per `validate_every` steps. pending: sums towards the next row.
+    learning_rate} per `log_every` steps and one at the end, means since the row before. validation: one row
+    {step, psnr_scenes, ...} per `validate_every` steps and one at the end. pending: sums for the next row.
     """
 
     step: int
@@ -52,10 +52,10 @@ class TrainState:
         torch._foreach_lerp_(list(self.average.values()), [weights[n] for n in self.average], 1 - decay)
         self.step += 1
 
-    def log(self, loss: float, psnr: float, rate: float, every: int) -> dict[str, float] | None:
-        """Take in the figures of the step just done; the row of the history that it completes, if any."""
+    def log(self, loss: float, psnr: float, rate: float, *, is_due: bool) -> dict[str, float] | None:
+        """Take in the figures of the step just done; the row of the history that ends here, if any."""
         self.pending.append((loss, psnr))
-        if self.step % every:
+        if not is_due:
             return None
         losses, psnrs = zip(*self.pending, strict=True)
         mean_loss, mean_psnr = sum(losses) / len(losses), sum(psnrs) / len(psnrs)

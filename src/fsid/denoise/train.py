@@ -133,7 +133,8 @@ def train(
                 loss, psnr = _step(accelerator, forward, net, optimizer, batch, rate, config)
                 state.advance(bare, config.ema_decay)
                 live.update(state.step, loss, psnr)
-                row = state.log(loss, psnr, rate, config.log_every)
+                is_due = state.step % config.log_every == 0 or state.step == config.steps
+                row = state.log(loss, psnr, rate, is_due=is_due)
                 if is_main:
                     keeper.after_step(row, bare, optimizer)
                 if progress is not None:
@@ -251,7 +252,8 @@ def _card(data_dir: Path, config: TrainConfig, images: int, initial: Denoiser | 
 
 
 def load_history(run_dir: str | Path) -> tuple[list[int], list[float], list[float]]:
-    """Steps, losses and PSNRs (dB) of a run's training batches, means over `log_every` steps each.
+    """Steps, losses and PSNRs (dB) of a run's training batches: means over `log_every` steps each, the last
+    over what is left.
 
     FsidError where the folder holds no history of a training.
     """
