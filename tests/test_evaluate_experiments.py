@@ -25,7 +25,7 @@ from fsid.evaluate.dead_leaves import RADIUS_PX, dead_leaves_rand, write_dead_le
 from fsid.evaluate.demo import ISOS, DemoConfig, _copy_photographs
 from fsid.evaluate.experiment_config import PHOTOGRAPHS, scale_config
 from fsid.evaluate.experiment_report import gaps
-from fsid.evaluate.experiments import TEST_ISOS, _data, _read_images, _training
+from fsid.evaluate.experiments import TEST_ISOS, _data, _read_images, _testsets, _training
 from fsid.evaluate.known import known_pictures
 from fsid.evaluate.simulated import LUXES
 from fsid.evaluate.testset import levels_of
@@ -173,18 +173,38 @@ def test_sources_of_all_sizes_are_trained_on_alike(tmp_path: Path):
     assert _training(replace(config, network=str(network)), 3).shrink == (1, 2)
 
 
-def test_rivals_trained_on_the_noise_of_other_cameras_are_not_gone_on_with(tmp_path: Path, refused):
-    config = replace(scale_config("ablation", "smoke"), count=2, steps=3)
-    with claimed(tmp_path, config, "experiment"):
+def test_rivals_differ_in_nothing_but_their_data(tmp_path: Path, refused):
+    """A file of settings that was edited since: the others would be trained with what it says now."""
+    network, out = tmp_path / "network.yaml", tmp_path / "out"
+    network.write_text("learning_rate: 0.002")
+    config = replace(scale_config("ablation", "smoke"), network=str(network), count=2, steps=3)
+    with claimed(out, config, "experiment"):
         pass
-    (tmp_path / "runs" / "objects-seed0").mkdir(parents=True)
-    begun = replace(_training(config, 0), profiles=("pixel6", "galaxy-s22"))
-    save_settings(begun, tmp_path / "runs" / "objects-seed0" / "config.yaml")
-    before = sorted(tmp_path.rglob("*"))
-    assert "config.yaml: was trained on the noise of pixel6, galaxy-s22 at ISO 400 to 15357.8" in refused(
-        "experiment", "ablation", "-o", tmp_path, *SMOKE
-    )
-    assert sorted(tmp_path.rglob("*")) == before
+    run = out / "runs" / "objects-seed1"
+    run.mkdir(parents=True)
+    save_settings(replace(_training(config, 1), profiles=("pixel6", "galaxy-s22")), run / "config.yaml")
+    (run / "checkpoint.safetensors").touch()
+    network.write_text("learning_rate: 0.005")
+    before = sorted(out.rglob("*"))
+    command = ["experiment", "ablation", "-o", out, *SMOKE, "--network", network]
+    told = refused(*command)
+    assert f"{run}/config.yaml: this run was started with another learning_rate, profiles" in told
+    assert sorted(out.rglob("*")) == before
+
+
+def test_a_test_set_of_another_noise_than_the_camera_has_now_is_not_measured_on(photos: Path, tmp_path: Path):
+    """A profile that was mended after the test sets were made: trainings would be on the noise of today."""
+    camera, profile = tmp_path / "camera.yaml", load_profile("pixel6")
+    save_profile(camera, profile)
+    config = replace(scale_config("ablation", "smoke"), camera=str(camera), tests=(str(photos),))
+    bar = partial(progress_bar, quiet=True)
+    made = _testsets(tmp_path, config, bar)
+    assert _testsets(tmp_path, config, bar) == made
+    save_profile(camera, replace(profile, k=2 * profile.k))
+    for path in made:
+        with pytest.raises(FsidError, match=rf"camera\.yaml: says another noise than that which {path} was"):
+            _testsets(tmp_path, config, bar)
+        shutil.rmtree(path)
 
 
 @pytest.mark.parametrize(

@@ -51,8 +51,9 @@ def prepare_run(data_dir: Path, run_dir: Path, config: TrainConfig, initial: Den
         )
     if any(run_dir.glob("shard-*.tar")):
         raise FsidError(f"{run_dir}: holds a dataset; give another folder for the run")
-    if there is not None and is_begun:
-        _check_same_run(data_dir, run_dir, there, config)
+    if is_begun:
+        check_same_training(run_dir, config)
+        _check_same_data(data_dir, run_dir)
     try:
         if not is_begun:
             make_folder(run_dir)
@@ -65,21 +66,29 @@ def prepare_run(data_dir: Path, run_dir: Path, config: TrainConfig, initial: Den
         raise FsidError(f"{run_dir}: cannot be written ({error.strerror})") from None
 
 
-def _check_same_run(data_dir: Path, run_dir: Path, there: TrainConfig, config: TrainConfig) -> None:
-    """FsidError where another training is in `run_dir` than that of `config` on `data_dir`."""
-    old, new = to_plain(there), to_plain(config)
+def check_same_training(run_dir: Path, config: TrainConfig) -> None:
+    """FsidError where a training has begun in `run_dir` that has other settings or noise than `config`."""
+    file = run_dir / CONFIG_FILE
+    if not (file.is_file() and has_network(run_dir)):
+        return
+    old, new = to_plain(_begun_with(file)), to_plain(config)
     if changed := [key for key in new if new[key] != old[key] and key not in _WITHOUT_EFFECT]:
         raise FsidError(
-            f"{run_dir / CONFIG_FILE}: this run was started with another {', '.join(changed)}; "
+            f"{file}: this run was started with another {', '.join(changed)}; "
             "continue it with its own settings or give another folder"
         )
-    rows, data, noise = read_sessions(run_dir), identity(data_dir), profiles_digest(config.profiles)
-    if any(row.get("noise", noise) != noise for row in rows):
+    noise = profiles_digest(config.profiles)
+    if any(row.get("noise", noise) != noise for row in read_sessions(run_dir)):
         raise FsidError(
             f"{run_dir}: this run was started with another noise than {', '.join(config.profiles)} says now; "
             "put the file back as it was or give another folder"
         )
-    if any(row.get("data", data) != data for row in rows):
+
+
+def _check_same_data(data_dir: Path, run_dir: Path) -> None:
+    """FsidError where a training has begun in `run_dir` on other data than `data_dir`."""
+    data = identity(data_dir)
+    if any(row.get("data", data) != data for row in read_sessions(run_dir)):
         raise FsidError(
             f"{run_dir}: this run was started on other data than {data_dir}; "
             "continue it with its own dataset or give another folder"

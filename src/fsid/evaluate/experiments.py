@@ -30,6 +30,7 @@ from fsid.dataset import (
 )
 from fsid.dataset.pictures import pictures_digest
 from fsid.denoise import TrainConfig, train, train_config
+from fsid.denoise.run_folder import check_same_training
 from fsid.errors import FsidError
 from fsid.evaluate.claim import claimed
 from fsid.evaluate.compare import (
@@ -61,6 +62,7 @@ from fsid.evaluate.testset import levels_of, photo_testset, read_testset
 from fsid.files import make_folder, read_whole
 from fsid.scene import VARIANTS
 from fsid.sensor import load_bayer_profile
+from fsid.sensor.profiles import profiles_digest
 
 ProgressBar = Callable[[str, str], AbstractContextManager[Callable[[int, int], None]]]
 TEST_ISOS = (800, 1600, 3200, 6400)
@@ -90,7 +92,7 @@ def experiment(
     out = Path(out)
     _check(out, config, bar, workers)
     with claimed(out, config, "experiment"):
-        _check_noise(out, config)
+        _check_trainings(out, config)
         return _run(out, config, bar, workers, note)
 
 
@@ -105,8 +107,8 @@ def _run(
     for source in SOURCES[config.kind]:
         data = _data(out, config, source, bar, workers)
         for seed in config.seeds:
-            name = f"{source}-seed{seed}"
-            run = out / "runs" / name
+            run = _run_folder(out, source, seed)
+            name = run.name
             if not (out / "measured" / f"{name}.csv").exists():
                 with bar(f"training {name}", "steps") as progress:
                     train(data, run, _training(config, seed), progress=progress)
@@ -149,21 +151,14 @@ def _known(config: ExperimentConfig, workers: int) -> str:
     return known_note(tests, find_pictures(Path(config.photos)), threads)
 
 
-def _check_noise(out: Path, config: ExperimentConfig) -> None:
-    """A run of an older FSID drew other noise, and no two rivals may differ in that."""
-    noise = _noise(_training(config, config.seeds[0]))
-    for file in sorted((out / "runs").glob("*/config.yaml")):
-        begun = _noise(load_settings(TrainConfig, file))
-        if begun != noise:
-            raise FsidError(
-                f"{file}: was trained on the noise of {begun}, and the others would be on that of {noise}; "
-                "use another folder"
-            )
+def _check_trainings(out: Path, config: ExperimentConfig) -> None:
+    """No two rivals may differ in more than their data: a file of settings may have been edited since."""
+    for source, seed in product(SOURCES[config.kind], config.seeds):
+        check_same_training(_run_folder(out, source, seed), _training(config, seed))
 
 
-def _noise(training: TrainConfig) -> str:
-    """The noise that a training draws, in words."""
-    return f"{', '.join(training.profiles)} at ISO {training.iso_min:g} to {training.iso_max:g}"
+def _run_folder(out: Path, source: str, seed: int) -> Path:
+    return out / "runs" / f"{source}-seed{seed}"
 
 
 def _training(config: ExperimentConfig, seed: int) -> TrainConfig:
@@ -231,12 +226,14 @@ def _testsets(out: Path, config: ExperimentConfig, bar: ProgressBar) -> list[Pat
                 seed=1000,
                 progress=progress,
             )
+    _check_camera(found[0], config.camera)
     for folder in config.tests:
         path = root / set_name(folder)
         found.append(path)
         if not (path / "testset.json").exists():
             with bar(f"test set {path.name}", "photographs") as progress:
                 photo_testset([Path(folder)], path, camera=config.camera, isos=TEST_ISOS, progress=progress)
+        _check_camera(path, config.camera)
         digest = read_testset(path).pictures_digest
         if digest and digest != pictures_digest(find_photos(folder)):
             raise FsidError(
@@ -244,6 +241,15 @@ def _testsets(out: Path, config: ExperimentConfig, bar: ProgressBar) -> list[Pat
                 "differ); put those back, or use another folder"
             )
     return found
+
+
+def _check_camera(path: Path, camera: str) -> None:
+    """FsidError where the file of the camera says other noise by now than the test set at `path` has."""
+    if read_testset(path).profiles_digest not in ("", profiles_digest([camera])):
+        raise FsidError(
+            f"{camera}: says another noise than that which {path} was made with; "
+            "put the file back as it was, or use another folder"
+        )
 
 
 def _measured(

@@ -19,6 +19,7 @@ from fsid.evaluate.testbench import MATERIALS, simulate
 from fsid.evaluate.testset import Progress, TestImage, TestSet, capture, levels_of
 from fsid.sensor import Raw, clean_from_linear, load_bayer_profile
 from fsid.sensor.light import GREY, KEY
+from fsid.sensor.profiles import profiles_digest
 
 LUXES = (0.5, 1.0, 2.0, 5.0)
 """The light levels of the paper."""
@@ -62,6 +63,7 @@ def simulated_testset(
         seed=seed,
         notes="drawn materials, light levels by the exposure model, noise from the camera's profile",
         frames=frames,
+        profiles_digest=profiles_digest([camera]),
     )
 
     def truth(rng: np.random.Generator, i: int) -> Raw:

@@ -39,6 +39,7 @@ from fsid.sensor import (
     write_dng,
 )
 from fsid.sensor.light import LONGEST_EXPOSURE_S
+from fsid.sensor.profiles import profiles_digest
 
 Progress = Callable[[int, int], None]
 
@@ -64,8 +65,8 @@ class TestImage:
 class TestSet:
     """The content of testset.json. frames: noisy captures per image and level.
 
-    pictures_digest: of names and sizes of the photographs; "" where there are none, and unknown in what FSID
-    wrote before it was recorded.
+    pictures_digest: of names and sizes of the photographs; "" where there are none. profiles_digest: of the
+    camera (`fsid.sensor.profiles`). Both are "" in what FSID wrote before they were recorded.
     """
 
     __test__ = False
@@ -77,6 +78,7 @@ class TestSet:
     notes: str
     frames: int = 1
     pictures_digest: str = ""
+    profiles_digest: str = ""
 
     def __post_init__(self) -> None:
         if self.seed < 0:
@@ -162,6 +164,7 @@ def photo_testset(
         seed=seed,
         notes="photographs unprocessed to RAW (Brooks et al. 2019), noise from the camera's profile",
         pictures_digest=pictures_digest([path for _, path in photos]),
+        profiles_digest=profiles_digest([camera]),
     )
 
     def truth(rng: np.random.Generator, i: int) -> Raw:
