@@ -223,6 +223,7 @@ def test_a_test_set_of_another_noise_than_the_camera_has_now_is_not_measured_on(
         (["ablation", "--set", "cameras=[galaxy-s22]"], "--set cameras: is no setting of the scenes"),
         (["ablation", "--set", "scene.hdri_share=1"], "scene.hdri_share: has no effect while"),
         (["ablation", "--width", "101"], "width: 101"),
+        (["ablation", "--height", "128"], "--width 480 --height 128: patches of the training need 130x130"),
         (["real-vs-synthetic", "--photos", "."], "holds no picture"),
         (["ablation", "--test", "."], "holds no photograph"),
         (["ablation", "--test", "a/val", "b/val"], "another test set is called val"),
@@ -247,6 +248,20 @@ def test_unreadable_photographs_are_named_before_anything_is_written(photos: Pat
     assert "2 of 8 pictures cannot be used" in told
     assert "broken-train.jpg: cannot be read" in told
     assert "broken-test.jpg: cannot be read" in told
+    assert not (tmp_path / "out").exists()
+
+
+def test_photographs_too_small_to_train_on_are_named_before_anything_is_written(
+    photos: Path, tmp_path: Path, refused
+):
+    """Smoke trains on patches of 16 packed pixels; a test photograph of that size can be measured on."""
+    for name, size in (("train", (120, 33)), ("test", (32, 32))):
+        shutil.copytree(photos, tmp_path / name)
+        Image.open(min(photos.iterdir())).resize(size).save(tmp_path / name / f"icon-{name}.png")
+    command = ["experiment", "real-vs-synthetic", "-o", str(tmp_path / "out"), *SMOKE]
+    told = refused(*command, "--photos", tmp_path / "train", "--test", tmp_path / "test")
+    assert "1 of 8 pictures cannot be used" in told
+    assert "icon-train.png: is 120x33 pixels, at least 34x34 are needed" in told
     assert not (tmp_path / "out").exists()
 
 

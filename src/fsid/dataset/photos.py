@@ -63,12 +63,12 @@ def read_photo(path: str | Path) -> np.ndarray:
     return pixels[:height, :width]
 
 
-def check_photo(path: str | Path) -> None:
-    """FsidError where `read_photo` has one, and for a photograph that shows nothing.
+def check_photo(path: str | Path, smallest_px: int = SMALLEST_PX) -> None:
+    """FsidError where `read_photo` has one, and for a photograph that shows nothing or is smaller.
 
     A JPEG takes a quarter of the time of `read_photo`, others little less.
     """
-    pixels = _read(path, shrink=8)
+    pixels = _read(path, shrink=8, smallest_px=smallest_px)
     for colour, shows_nothing in (("black", pixels.max() < _BLACK), ("white", pixels.min() > 1 - _BLACK)):
         if shows_nothing:
             raise FsidError(f"{path}: is {colour} all over")
@@ -81,15 +81,15 @@ def thumbnail(path: str | Path, side: int) -> np.ndarray:
     return np.stack([np.asarray(part) for part in parts]).T
 
 
-def _read(path: str | Path, shrink: int = 1, least_px: int = 1) -> np.ndarray:
+def _read(path: str | Path, shrink: int = 1, least_px: int = 1, smallest_px: int = SMALLEST_PX) -> np.ndarray:
     """As `read_photo`; a JPEG `shrink` times smaller, or of `least_px`, which its decoder does quickly."""
     check_file(Path(path))
     try:
         with Image.open(path, formats=_FORMATS) as image:
             _pass_thumbnails(image)
             width, height = image.size
-            if min(width, height) < SMALLEST_PX:
-                needed = f"at least {SMALLEST_PX}x{SMALLEST_PX} are needed"
+            if min(width, height) < smallest_px:
+                needed = f"at least {smallest_px}x{smallest_px} are needed"
                 raise FsidError(f"{path}: is {width}x{height} pixels, {needed}")
             if shrink > 1:
                 image.draft(image.mode, (max(width // shrink, least_px), max(height // shrink, least_px)))

@@ -129,17 +129,22 @@ def _check(out: Path, config: ExperimentConfig, bar: ProgressBar, workers: int) 
     Its folder is taken once it has begun: the corrected command would be another experiment. Until then every
     photograph is decoded, to see that it can be.
     """
-    _training(config, config.seeds[0])
+    training = _training(config, config.seeds[0])
     for source in SOURCES[config.kind]:
         _generator(out, config, source)
         _count(config, source)
     check_given(_generator(out, config, SCENES), given_keys(config.settings))
-    pictures = [path for folder in config.tests for path in find_photos(Path(folder))]
-    if PHOTOGRAPHS in SOURCES[config.kind]:
-        pictures += find_pictures(Path(config.photos))
-    if pictures and not (out / "experiment.yaml").exists():
+    least = 2 * training.patch_px + 2 if 1 in training.shrink else 0
+    if min(config.width, config.height) < least:
+        raise FsidError(
+            f"--width {config.width} --height {config.height}: patches of the training need {least}x{least}"
+        )
+    tests = [path for folder in config.tests for path in find_photos(Path(folder))]
+    photos = find_pictures(Path(config.photos)) if PHOTOGRAPHS in SOURCES[config.kind] else []
+    if (tests or photos) and not (out / "experiment.yaml").exists():
         with bar("checking photographs", "pictures") as progress:
-            check_pictures(pictures, min(workers, os.cpu_count() or 1), progress)
+            threads = min(workers, os.cpu_count() or 1)
+            check_pictures([*tests, *photos], threads, progress, dict.fromkeys(photos, least))
 
 
 def _known(config: ExperimentConfig, workers: int) -> str:
