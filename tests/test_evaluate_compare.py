@@ -194,6 +194,15 @@ def test_a_table_names_levels_and_marks_the_best(small_set: Path):
     assert level_label("isolated") == "isolated"
 
 
+def test_a_capture_that_a_method_refuses_is_named(small_set: Path, tmp_path: Path):
+    shutil.copytree(small_set, tmp_path / "set")
+    testset = read_testset(small_set)
+    capture = testset.noisy(tmp_path / "set", testset.images[1], "iso3200")
+    write_dng(capture, dataclasses.replace(read_raw(capture), noise=None))
+    with pytest.raises(FsidError, match=rf"{capture}: classical: .* the noise level is unknown"):
+        compare(tmp_path / "set", [NOISY, CLASSICAL])
+
+
 def test_names_are_text_and_nothing_else(small_set: Path, tmp_path: Path, capsys):
     shutil.copytree(small_set, tmp_path / "set")
     testset = read_testset(small_set)

@@ -123,14 +123,15 @@ def compare(
         progress(done, len(tasks))
         truth = read_raw(testset.clean(root, image, level))
         developed_truth = develop(truth)
-        frames = [_noisy(testset.noisy(root, image, level, n), truth) for n in range(testset.frames)]
+        paths = [testset.noisy(root, image, level, n) for n in range(testset.frames)]
+        frames = [_noisy(path, truth) for path in paths]
         outputs, shown_psnr = {}, {}
         for method in methods:
-            results = [_denoised(method, frame) for frame in frames]
+            results = [_denoised(method, frame, path) for frame, path in zip(frames, paths, strict=True)]
             developed = [develop(result) for result in results]
             outputs[method.name] = developed[0]
             figures = [
-                (psnr(r.mosaic, truth.mosaic), psnr(d, developed_truth), ssim(d, developed_truth))
+                (_db(r.mosaic, truth.mosaic), _db(d, developed_truth), ssim(d, developed_truth))
                 for r, d in zip(results, developed, strict=True)
             ]
             shown_psnr[method.name] = figures[0][0]
