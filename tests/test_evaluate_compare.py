@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rawpy
+from PIL import Image
 
 from fsid.cli.main import main
 from fsid.errors import FsidError
@@ -28,7 +29,7 @@ from fsid.evaluate import (
     write_comparison,
     write_results,
 )
-from fsid.evaluate.compare import Row, confidence
+from fsid.evaluate.compare import MOST_DB, Row, confidence
 from fsid.evaluate.comparison_report import comparison_sections
 from fsid.evaluate.models import model_names
 from fsid.evaluate.report import METRICS, level_label, write_report
@@ -103,8 +104,25 @@ def test_the_truth_scores_perfectly(small_set: Path):
         (row,) = compare(small_set, [perfect]).rows
     finally:
         (small_set / "testset.json").write_text(json.dumps(dataclasses.asdict(testset)))
-    assert row.psnr_raw == float("inf")
+    assert (row.psnr_raw, row.psnr) == (MOST_DB, MOST_DB)
     assert row.ssim == pytest.approx(1.0)
+
+
+def test_a_picture_without_noise_leaves_its_set_a_mean(photos: Path, tmp_path: Path, capsys):
+    """Black at a low ISO is stored as it is: its PSNR was infinite, and the mean of the set null."""
+    shutil.copytree(photos, tmp_path / "photos")
+    Image.new("RGB", (64, 64)).save(tmp_path / "photos" / "black.png")
+    photo_testset([tmp_path / "photos"], tmp_path / "set", camera="pixel6", isos=[50])
+    main(["evaluate", str(tmp_path / "set"), "-o", str(tmp_path)])
+    told = capsys.readouterr().err
+    perfect = "result without error (noisy of 0000-black at iso50 for one): a PSNR counts as 100 dB at most"
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert perfect in told
+    assert perfect in page
+    noisy = json.loads((tmp_path / "results.json").read_text())[0]
+    figures = [float(line.split(",")[4]) for line in (tmp_path / "images.csv").read_text().splitlines()[1::2]]
+    assert max(figures) == MOST_DB
+    assert noisy["psnr_raw"] == pytest.approx(np.mean(figures), abs=1e-4)
 
 
 def test_a_method_may_work_in_place(small_set: Path):

@@ -16,12 +16,17 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 from scipy.special import stdtrit
 
+from fsid.counted import counted
 from fsid.errors import FsidError
 from fsid.evaluate.classical import denoise_classical
 from fsid.evaluate.metrics import psnr, ssim
 from fsid.evaluate.testset import ALL_SETS, TestImage, TestSet, read_testset
 from fsid.files import write_atomically
 from fsid.sensor import Raw, develop, read_raw, upright
+
+MOST_DB = 100.0
+"""What a PSNR counts as at most: an rms error of 1e-5 of white is less than a step of a 16-bit file. A result
+that equals its truth has an infinite one, and so would have every mean over it."""
 
 
 @dataclass(frozen=True)
@@ -144,6 +149,22 @@ def compare(
     return Comparison(testset, tuple(summarise(testset, methods, images)), tuple(images), tuple(crops))
 
 
+def _db(image: np.ndarray, truth: np.ndarray) -> float:
+    return min(psnr(image, truth), MOST_DB)
+
+
+def perfect_note(images: Iterable[ImageRow]) -> str:
+    """In words, how many results have no error, and what that does to means; "" where none does."""
+    perfect = [row for row in images if max(row.psnr_raw, row.psnr) >= MOST_DB]
+    if not perfect:
+        return ""
+    first = f"{perfect[0].model} of {perfect[0].image} at {perfect[0].level}"
+    return (
+        f"{counted(len(perfect), 'result')} without error ({first} for one): "
+        f"a PSNR counts as {MOST_DB:g} dB at most, and so many lift a mean"
+    )
+
+
 def _noisy(path: Path, truth: Raw) -> Raw:
     """A capture, with the colours of its truth: a phone may balance white in each frame of a burst anew."""
     noisy = read_raw(path)
@@ -152,8 +173,11 @@ def _noisy(path: Path, truth: Raw) -> Raw:
     return replace(noisy, white_balance=truth.white_balance, xyz_to_camera=truth.xyz_to_camera)
 
 
-def _denoised(method: Method, frame: Raw) -> Raw:
-    result = method.denoise(deepcopy(frame))
+def _denoised(method: Method, frame: Raw, path: Path) -> Raw:
+    try:
+        result = method.denoise(deepcopy(frame))
+    except FsidError as error:
+        raise FsidError(f"{path}: {method.name}: {error}") from None
     if not isinstance(result, Raw):
         kind = type(result).__name__
         raise FsidError(f"{method.name}: denoise returns a Raw, replace(raw, mosaic=...); got {kind}")

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from fsid.counted import counted
 from fsid.dataset.inspect_plot import as_label
-from fsid.evaluate.compare import Comparison, Crops, Row, confidence
+from fsid.evaluate.compare import Comparison, Crops, Row, confidence, perfect_note
 from fsid.evaluate.report import (
     METRICS,
     Picture,
@@ -32,9 +32,10 @@ def comparison_sections(comparison: Comparison) -> list[Section]:
     *single, whole = dict.fromkeys(row.set for row in comparison.rows)
     images = next(row.n for row in comparison.rows if row.set == whole)
     over_sets = f" over the {len(single)} sets, since images of a set are alike" if single else ""
+    perfect = perfect_note(comparison.images)
     text = (
         f"{'All sets together' if single else whole}: means over {counted(images, 'image')}, ± half the "
-        f"width of the 95 % confidence interval{over_sets}; bold is best."
+        f"width of the 95 % confidence interval{over_sets}; bold is best.{f' {perfect}.' if perfect else ''}"
     )
     tables = tuple(_metric_table(comparison, whole, *metric) for metric in METRICS)
     sections = [

@@ -17,7 +17,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from fsid.dataset.inspect_plot import as_label
-from fsid.evaluate.compare import ImageRow, Row
+from fsid.evaluate.compare import ImageRow, Row, perfect_note
 from fsid.evaluate.experiment_config import ExperimentConfig
 from fsid.evaluate.report import METRICS, Section, Table, level_label, method_label, plot, write_report
 from fsid.evaluate.testset import ALL_SETS
@@ -48,8 +48,8 @@ def write_experiment_report(
     if single:
         sections.append(_by_material(results, single))
     title = "FSID: ablation" if config.kind == "ablation" else "FSID: synthetic against real"
-    lead = f"{_lead(config, pairs)} {known}." if known else _lead(config, pairs)
-    write_report(file, title, lead, sections)
+    said = [f"{line}." for line in (known, perfect_note(images)) if line]
+    write_report(file, title, " ".join([_lead(config, pairs), *said]), sections)
     return file
 
 
