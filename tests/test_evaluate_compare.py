@@ -33,7 +33,7 @@ from fsid.evaluate.compare import MOST_DB, Row, confidence
 from fsid.evaluate.comparison_report import comparison_sections
 from fsid.evaluate.models import model_names
 from fsid.evaluate.report import METRICS, level_label, write_report
-from fsid.evaluate.testset import staged
+from fsid.evaluate.testset import staged, write_testset
 from fsid.files import write_atomically
 from fsid.sensor import Raw, read_raw, write_dng
 
@@ -272,6 +272,15 @@ def test_the_report_says_what_its_intervals_count(small_set: Path, tmp_path: Pat
     values = [image.psnr_raw for image in comparison.images if image.level == "iso800"]
     half = confidence(values, [image.set for image in comparison.images if image.level == "iso800"])
     assert figures.tables[0].rows[0][1].endswith(f" ± {half:.2f}")
+
+
+def test_the_report_speaks_of_no_interval_of_one_image(small_set: Path, tmp_path: Path):
+    shutil.copytree(small_set, tmp_path / "set")
+    testset = read_testset(small_set)
+    write_testset(tmp_path / "set", dataclasses.replace(testset, images=testset.images[:1]))
+    (figures, *_) = comparison_sections(compare(tmp_path / "set", [NOISY]))
+    assert "means over 1 image; bold is best." in figures.text
+    assert "±" not in "".join(figures.tables[0].rows[0])
 
 
 def test_an_image_with_nan_is_not_perfect():

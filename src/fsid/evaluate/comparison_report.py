@@ -32,10 +32,11 @@ def comparison_sections(comparison: Comparison) -> list[Section]:
     *single, whole = dict.fromkeys(row.set for row in comparison.rows)
     images = next(row.n for row in comparison.rows if row.set == whole)
     over_sets = f" over the {len(single)} sets, since images of a set are alike" if single else ""
+    interval = f", ± half the width of the 95 % confidence interval{over_sets}" if images > 1 else ""
     perfect = perfect_note(comparison.images)
     text = (
-        f"{'All sets together' if single else whole}: means over {counted(images, 'image')}, ± half the "
-        f"width of the 95 % confidence interval{over_sets}; bold is best.{f' {perfect}.' if perfect else ''}"
+        f"{'All sets together' if single else whole}: means over {counted(images, 'image')}{interval}; "
+        f"bold is best.{f' {perfect}.' if perfect else ''}"
     )
     tables = tuple(_metric_table(comparison, whole, *metric) for metric in METRICS)
     sections = [

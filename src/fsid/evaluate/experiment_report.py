@@ -202,7 +202,8 @@ def _of_set(results: _Results, name: str, kind: str) -> Section:
             paper = list(PAPER_GAP.values())
             body.append(("the paper's gap", *(f"{g:+.2f}" for g in paper), f"{np.mean(paper):+.2f}"))
         tables.append(Table(f"Gap of {title}", head, tuple(body)))
-    text = "Means over images and seeds, ± half the spread between seeds."
+    spread = ", ± half the spread between seeds" if len(results.seeds) > 1 else ""
+    text = f"Means over images and seeds{spread}."
     return Section(
         _set_label(name), text, tuple(tables), ((plot(_gap_plot(results, name), "paired medians"),),)
     )
