@@ -20,15 +20,15 @@ from fsid.cli.progress import progress_bar
 from fsid.config import read_yaml, save_settings
 from fsid.errors import FsidError
 from fsid.evaluate.claim import claimed
-from fsid.evaluate.compare import ImageRow, write_images
+from fsid.evaluate.compare import NOISY, ImageRow, Method, summarise, write_images
 from fsid.evaluate.dead_leaves import RADIUS_PX, dead_leaves_rand, write_dead_leaves
 from fsid.evaluate.demo import ISOS, DemoConfig, _copy_photographs
-from fsid.evaluate.experiment_config import PHOTOGRAPHS, scale_config
-from fsid.evaluate.experiment_report import gaps
+from fsid.evaluate.experiment_config import PHOTOGRAPHS, SOURCES, scale_config
+from fsid.evaluate.experiment_report import gaps, write_experiment_report
 from fsid.evaluate.experiments import TEST_ISOS, _data, _read_images, _testsets, _training
 from fsid.evaluate.known import known_pictures
 from fsid.evaluate.simulated import LUXES
-from fsid.evaluate.testset import levels_of
+from fsid.evaluate.testset import TestImage, TestSet, levels_of
 from fsid.sensor import load_profile, save_profile
 
 SMOKE = ("--scale", "smoke", "--count", "2", "--steps", "3", "--quiet")
@@ -51,6 +51,30 @@ def test_a_gap_is_paired_by_image():
         for name, value in values.items()
     ]
     assert sorted(gaps(rows, "full-seed0", "x-seed0", "iso800", "s", "psnr_raw")) == [-0.5, 1.0]
+
+
+def test_figures_of_two_seeds_have_a_spread_and_gaps_of_their_own(tmp_path: Path):
+    config = scale_config("ablation", "smoke")
+    figures = {"noisy": (30, 20), "classical": (33, 21)}
+    for n, source in enumerate(SOURCES["ablation"]):
+        figures |= {f"{source}-seed{seed}": (34 + n + seed, 25 + n - seed * n) for seed in config.seeds}
+    images = [
+        ImageRow(model, "iso800", name, "i", each, each, 0.9)
+        for model, pair in figures.items()
+        for name, each in zip("ab", pair, strict=True)
+    ]
+    testset = TestSet("pixel6", ("iso800",), (TestImage("i", "a"), TestImage("i2", "b")), 0, "")
+    images = [replace(row, image="i2") if row.set == "b" else row for row in images]
+    rows = summarise(testset, [Method(model, "", NOISY.denoise) for model in figures], images)
+    pairs = dict.fromkeys(SOURCES["ablation"], 2)
+    page = write_experiment_report(tmp_path / "r.html", config, pairs, rows, images).read_text()
+    full, objects = ([np.mean(figures[f"{s}-seed{n}"]) for n in (0, 1)] for s in ("full", "objects"))
+    assert f"<td>full</td><td>{np.mean(full):.2f} ± {np.ptp(full) / 2:.2f}</td>" in page
+    gap, medians = np.mean(full) - np.mean(objects), np.subtract(full, objects)
+    shown = f"<td>{gap:+.2f} (ISO 800)</td><td>{medians[0]:+.2f} {medians[1]:+.2f}</td>"
+    assert f"<td>all materials</td><td>{gap:+.2f}</td>{shown}" in page
+    assert "± half the spread between seeds." in page
+    assert "paired medians, mean and range of the seeds" in page
 
 
 def test_synthetic_against_real_goes_on_where_it_was_stopped(photos: Path, tmp_path: Path, refused, capsys):

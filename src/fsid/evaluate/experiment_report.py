@@ -202,11 +202,11 @@ def _of_set(results: _Results, name: str, kind: str) -> Section:
             paper = list(PAPER_GAP.values())
             body.append(("the paper's gap", *(f"{g:+.2f}" for g in paper), f"{np.mean(paper):+.2f}"))
         tables.append(Table(f"Gap of {title}", head, tuple(body)))
-    spread = ", ± half the spread between seeds" if len(results.seeds) > 1 else ""
-    text = f"Means over images and seeds{spread}."
-    return Section(
-        _set_label(name), text, tuple(tables), ((plot(_gap_plot(results, name), "paired medians"),),)
-    )
+    text, medians = "Means over images and seeds.", "paired medians"
+    if len(results.seeds) > 1:
+        text = "Means over images and seeds, ± half the spread between seeds."
+        medians = "paired medians, mean and range of the seeds"
+    return Section(_set_label(name), text, tuple(tables), ((plot(_gap_plot(results, name), medians),),))
 
 
 def _by_material(results: _Results, names: Sequence[str]) -> Section:
