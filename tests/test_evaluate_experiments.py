@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import io
 import json
 import re
 import shutil
@@ -27,6 +29,7 @@ from fsid.evaluate.experiment_config import PHOTOGRAPHS, SOURCES, scale_config
 from fsid.evaluate.experiment_report import gaps, write_experiment_report
 from fsid.evaluate.experiments import TEST_ISOS, _data, _read_images, _testsets, _training
 from fsid.evaluate.known import known_pictures
+from fsid.evaluate.plots import loss_plot
 from fsid.evaluate.simulated import LUXES
 from fsid.evaluate.testset import TestImage, TestSet, levels_of
 from fsid.sensor import load_profile, save_profile
@@ -311,6 +314,16 @@ def test_the_slider_of_a_report_moves_in_a_browser(photos: Path, tmp_path: Path)
     title = dom[dom.index("<title>") : dom.index("</title>")]
     assert "80%" in title
     assert "true" in title
+
+
+def test_the_course_of_a_training_of_one_row_can_be_seen():
+    """Of fewer steps than `log_every`; a line of one point is none."""
+    png = base64.b64decode(loss_plot([8], [1.0], [30.0]).uri.partition(",")[2])
+    pixels = np.asarray(Image.open(io.BytesIO(png)).convert("RGB"), np.int16)
+    is_coloured = np.ptp(pixels, axis=2) > 100
+    half = is_coloured.shape[1] // 2
+    assert is_coloured[:, :half].any()
+    assert is_coloured[:, half:].any()
 
 
 def test_figures_of_something_else_are_not_taken_for_measured_ones(tmp_path: Path):

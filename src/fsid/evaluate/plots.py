@@ -31,7 +31,7 @@ def loss_plot(steps: Sequence[int], losses: Sequence[float], psnrs: Sequence[flo
     figure = Figure(figsize=(8, 2.8))
     left, right = figure.subplots(1, 2)
     for axis, values, label in ((left, losses, "training loss"), (right, psnrs, "training PSNR (dB)")):
-        axis.plot(steps, values, linewidth=1)
+        axis.plot(steps, values, "." if len(steps) == 1 else "-", linewidth=1)
         axis.set(xlabel="step", ylabel=label)
         axis.grid(alpha=0.3)
     left.set_yscale("log")
