@@ -19,7 +19,7 @@ from PIL import Image
 
 from fsid.config import load_settings
 from fsid.dataset import GenerateConfig, generate, shard_keys
-from fsid.dataset.crew import TRIES, LocalCrew, run
+from fsid.dataset.crew import TRIES, LocalCrew, Lost, Ready, run
 from fsid.errors import FsidError
 
 KILLS = 50
@@ -324,6 +324,48 @@ def unimportable(gpu: int | None):
 def test_workers_that_cannot_start_end_the_run() -> None:
     with pytest.raises(FsidError, match="no worker lives long enough"):
         list(run(LocalCrew(1, unimportable), ["a", "b"], tasks_per_worker=10))
+
+
+class Cluster:
+    """A crew of two: worker 0 does its tasks, worker 1 never gets a place, or dies as it starts."""
+
+    size = 2
+
+    def __init__(self, second_dies: bool, first_too: bool = False) -> None:
+        self._events: list[tuple[int, object]] = []
+        self._dying = {1: second_dies, 0: first_too}
+
+    def start(self, worker: int) -> None:
+        if self._dying[worker]:
+            self._events.append((worker, Lost("no fsid there")))
+        elif worker == 0:
+            self._events.append((worker, Ready()))
+
+    def send(self, worker: int, task: str) -> None:
+        assert worker == 0
+        self._events.append((worker, task.upper()))
+
+    def wait(self) -> list[tuple[int, object]]:
+        assert self._events, "would wait for ever"
+        events, self._events = self._events, []
+        return events
+
+    def stop(self) -> None:
+        pass
+
+
+@pytest.mark.parametrize("second_dies", [False, True])
+def test_a_worker_that_never_starts_keeps_no_task_from_the_others(second_dies: bool) -> None:
+    """As after a cluster has lost a machine, or where one of its machines can start none."""
+    tasks, lines = [str(i) for i in range(2 * TRIES + 2)], list[str]()
+    results = list(run(Cluster(second_dies), tasks, tasks_per_worker=3, lost=lines.append))
+    assert results == [(task, task.upper()) for task in tasks]
+    assert set(lines) == ({"worker 1 died (no fsid there) at its start"} if second_dies else set())
+
+
+def test_a_cluster_on_which_no_worker_starts_ends_the_run() -> None:
+    with pytest.raises(FsidError, match=r"no worker lives long .* at its start \(no fsid there\)"):
+        list(run(Cluster(True, first_too=True), ["a", "b"], tasks_per_worker=3))
 
 
 def test_workers_are_replaced_after_some_tasks() -> None:

@@ -14,7 +14,8 @@ from PIL import Image
 pytest.importorskip("ray")
 
 from fsid.dataset import GenerateConfig, Workforce, generate
-from fsid.dataset.ray_crew import _Member
+from fsid.dataset.crew import Ready
+from fsid.dataset.ray_crew import _identity, _Member, _reason
 from fsid.errors import FsidError
 
 
@@ -101,6 +102,22 @@ def test_a_machine_without_the_folder_is_one_line(tmp_path: Path) -> None:
     result = member.do("task")
     assert isinstance(result, FsidError)
     assert f"cannot work in {tmp_path / 'gone'} (No such file" in str(result)
+
+
+def test_a_machine_with_another_fsid_is_one_line(tmp_path: Path) -> None:
+    """Its pairs would be others, in the same dataset, without a word."""
+    member = _Member(lambda gpu: str, False, str(tmp_path))
+    assert member.ready(_identity()) == Ready()
+    result = member.ready("fsid 0.0.9, files 00000000, NumPy 1.0")
+    assert isinstance(result, FsidError)
+    assert f"another FSID or NumPy ({_identity()}) than this machine (fsid 0.0.9, files 0" in str(result)
+
+
+def test_what_was_raised_on_a_machine_is_named_with_it() -> None:
+    text = "The actor died because of an error raised in its creation task, A() (pid=1, ip=192.0.2.2)\nE: why"
+    assert _reason(RuntimeError(text)) == "RuntimeError on 192.0.2.2: E: why"
+    died = "The actor died unexpectedly before finishing this task.\n\tip: 192.0.2.7\nIts process has died."
+    assert _reason(RuntimeError(died)) == "RuntimeError on 192.0.2.7"
 
 
 def test_a_cluster_that_does_not_answer_is_one_line(tmp_path: Path) -> None:

@@ -3,11 +3,11 @@
     for task, result in run(crew, tasks): ...           in the order in which they finish
 
 A worker is a process here (`LocalCrew`) or an actor of a Ray cluster (`RayCrew`); the loop that feeds them is
-one. It starts a new worker in place of a lost one and gives its task to the next that is free. The libraries'
-pools cannot do that: `multiprocessing.Pool` waits for ever for the result of a killed worker,
-`ProcessPoolExecutor` gives up all workers for one, and stops with tasks left where workers are to be replaced
-after a number of tasks (CPython issue 115634), and `ray.util.multiprocessing.Pool` keeps sending tasks to an
-actor that is dead.
+one. It starts a new worker in place of a lost one and gives its task to the next that is free; one that waits
+for a place on a cluster keeps no task from the others. The libraries' pools cannot do that:
+`multiprocessing.Pool` waits for ever for the result of a killed worker, `ProcessPoolExecutor` gives up all
+workers for one, and stops with tasks left where workers are to be replaced after a number of tasks (CPython
+issue 115634), and `ray.util.multiprocessing.Pool` keeps sending tasks to an actor that is dead.
 """
 
 from __future__ import annotations
@@ -45,6 +45,11 @@ class Lost:
 
 
 @dataclass(frozen=True)
+class Ready:
+    """In place of a result: the worker can take its first task."""
+
+
+@dataclass(frozen=True)
 class _Bug:
     """In place of a result: the work raised what is not bad input."""
 
@@ -58,13 +63,13 @@ class Crew(Protocol):
     def size(self) -> int: ...
 
     def start(self, worker: int) -> None:
-        """A fresh worker under this number; the one that had it is let go."""
+        """A fresh worker under this number, which `wait` calls Ready; the one that had it is let go."""
 
     def send(self, worker: int, task: Any) -> None:
         """Give an idle worker a task."""
 
     def wait(self) -> list[tuple[int, Any]]:
-        """Block until at least one is done: (worker, result or Lost)."""
+        """Block until at least one is done or started: (worker, result, Ready or Lost)."""
 
     def stop(self) -> None:
         """End all workers, whatever they do."""
@@ -83,50 +88,83 @@ def run(
     Raises FsidError at the end where a task killed its worker `TRIES` times, or at once where no worker
     lives long enough to finish anything.
     """
-    queue = deque(range(len(tasks)))
-    spoilt: list[int] = []
-    busy: dict[int, int] = {}
-    done, deaths, barren = Counter[int](), Counter[int](), 0
     try:
-        for worker in range(min(crew.size, len(tasks))):
-            crew.start(worker)
-            _feed(crew, worker, tasks, queue, busy)
-        while busy:
-            for worker, result in crew.wait():
-                task = busy.pop(worker)
-                if isinstance(result, Lost):
-                    lost(f"worker {worker} died ({result.reason}) at {tasks[task]}")
-                    barren, deaths[task] = barren + 1, deaths[task] + 1
-                    if deaths[task] < TRIES:
-                        queue.append(task)
-                    else:
-                        spoilt.append(task)
-                    if barren == TRIES * crew.size:
-                        raise FsidError(_hopeless(result, tasks[task]))
-                    crew.start(worker)
-                else:
-                    barren, done[worker] = 0, done[worker] + 1
-                    if done[worker] % tasks_per_worker == 0 and queue:
-                        crew.start(worker)
-                _feed(crew, worker, tasks, queue, busy)
-                if not isinstance(result, Lost):
-                    yield tasks[task], _checked(result)
+        yield from _Shift(crew, tasks, tasks_per_worker, lost).results()
     finally:
         crew.stop()
-    if spoilt:
-        names = ", ".join(str(tasks[task]) for task in spoilt)
-        raise FsidError(f"these killed their worker {TRIES} times: {names}; all others are done")
 
 
-def _feed(crew: Crew, worker: int, tasks: Sequence[Any], queue: deque[int], busy: dict[int, int]) -> None:
-    if queue:
-        busy[worker] = queue.popleft()
-        crew.send(worker, tasks[busy[worker]])
+class _Shift:
+    """Who of a crew is at which of `tasks`, which are known by their place there."""
+
+    def __init__(
+        self, crew: Crew, tasks: Sequence[Any], tasks_per_worker: int, lost: Callable[[str], None]
+    ) -> None:
+        self._crew, self._tasks, self._tasks_per_worker, self._lost = crew, tasks, tasks_per_worker, lost
+        self._queue = deque(range(len(tasks)))
+        self._idle: list[int] = []
+        self._busy: dict[int, int] = {}
+        self._fallen: list[int] = []
+        self._spoilt: list[int] = []
+        self._done, self._deaths, self._barren = Counter[int](), Counter[int](), 0
+
+    def results(self) -> Iterator[tuple[Any, Any]]:
+        for worker in range(min(self._crew.size, len(self._tasks))):
+            self._crew.start(worker)
+        while self._queue or self._busy:
+            for worker, result in self._crew.wait():
+                task = self._busy.pop(worker, None)
+                if isinstance(result, Lost):
+                    self._replace(worker, task, result)
+                elif isinstance(result, Ready):
+                    self._idle.append(worker)
+                else:
+                    checked = _checked(result)
+                    self._keep(worker)
+                self._feed()
+                if task is not None and not isinstance(result, Lost):
+                    yield self._tasks[task], checked
+        if self._spoilt:
+            names = ", ".join(str(self._tasks[task]) for task in self._spoilt)
+            raise FsidError(f"these killed their worker {TRIES} times: {names}; all others are done")
+
+    def _feed(self) -> None:
+        while self._queue and self._idle:
+            worker = self._idle.pop(0)
+            self._busy[worker] = self._queue.popleft()
+            self._crew.send(worker, self._tasks[self._busy[worker]])
+
+    def _replace(self, worker: int, task: int | None, loss: Lost) -> None:
+        """One that dies as it starts, while others work, is started again when they have finished something:
+        a machine of a cluster that can start none must not end the run."""
+        place = "its start" if task is None else str(self._tasks[task])
+        self._lost(f"worker {worker} died ({loss.reason}) at {place}")
+        if task is not None:
+            self._deaths[task] += 1
+            (self._queue if self._deaths[task] < TRIES else self._spoilt).append(task)
+        elif self._busy:
+            self._fallen.append(worker)
+            return
+        self._barren += 1
+        if self._barren == TRIES * self._crew.size:
+            raise FsidError(_hopeless(loss, place))
+        self._crew.start(worker)
+
+    def _keep(self, worker: int) -> None:
+        """It has done a task."""
+        self._barren = 0
+        self._done[worker] += 1
+        if self._done[worker] % self._tasks_per_worker == 0 and self._queue:
+            self._crew.start(worker)
+        else:
+            self._idle.append(worker)
+        while self._fallen:
+            self._crew.start(self._fallen.pop())
 
 
-def _hopeless(last: Lost, task: object) -> str:
+def _hopeless(last: Lost, place: str) -> str:
     return (
-        f"no worker lives long enough to make anything: the last died at {task} ({last.reason}). "
+        f"no worker lives long enough to make anything: the last died at {place} ({last.reason}). "
         "Is there too little memory, does `python -c 'import fsid.dataset'` fail, or does a script of yours "
         "call fsid outside `if __name__ == '__main__':`?"
     )
@@ -173,6 +211,7 @@ class LocalCrew:
         self._context = multiprocessing.get_context("spawn")
         self._members: dict[int, tuple[SpawnProcess, Connection]] = {}
         self._busy: set[int] = set()
+        self._started: list[int] = []
 
     @property
     def size(self) -> int:
@@ -189,6 +228,7 @@ class LocalCrew:
             process.start()
         theirs.close()
         self._members[worker] = process, ours
+        self._started.append(worker)
 
     def send(self, worker: int, task: Any) -> None:
         self._busy.add(worker)
@@ -196,6 +236,9 @@ class LocalCrew:
             self._members[worker][1].send(task)
 
     def wait(self) -> list[tuple[int, Any]]:
+        if self._started:  # the pipe keeps a task until the process reads it
+            started, self._started = self._started, []
+            return [(worker, Ready()) for worker in started]
         pipes: dict[Any, int] = {self._members[worker][1]: worker for worker in self._busy}
         return [(pipes[pipe], self._receive(pipes[pipe])) for pipe in wait(list(pipes))]
 

@@ -7,16 +7,25 @@ folder of the process that made the crew, so that relative paths mean the same t
 
 from __future__ import annotations
 
+import hashlib
 import logging
 import os
+import re
 import socket
 from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
 from typing import Any
 
-from fsid.dataset.crew import Lost, MakeWork, do_task, thread_limits
+import numpy as np
+
+import fsid
+from fsid.dataset.crew import Lost, MakeWork, Ready, do_task, thread_limits
 from fsid.errors import FsidError
 
 _PATIENCE_S = 5.0
+_DECIDING = {".py", ".glsl", ".frag", ".vert", ".yaml", ".npy"}
+"""Of the files of FSID, those that pixels depend on."""
 
 
 class _Member:
@@ -27,6 +36,15 @@ class _Member:
 
         self._work = make_work(_gpu_number(ray.get_gpu_ids()) if has_gpu else None)
         self._folder = folder
+
+    def ready(self, identity: str) -> Ready | FsidError:
+        """Whether the machine has the FSID of `identity`, which decides what pairs look like."""
+        if _identity() == identity:
+            return Ready()
+        return FsidError(
+            f"--ray: {socket.gethostname()} has another FSID or NumPy ({_identity()}) than this machine "
+            f"({identity}); install the same on all of them"
+        )
 
     def do(self, task: Any) -> Any:
         return do_task(self._do_in_folder, task)
@@ -40,6 +58,19 @@ class _Member:
                 "run the command in a folder that all machines have"
             ) from None
         return self._work(task)
+
+
+@cache
+def _identity() -> str:
+    """The versions of FSID and NumPy, and a hash of FSID's files: a checkout changes without its version."""
+    package = Path(fsid.__file__).parent
+    files = sorted(path for path in package.rglob("*") if path.suffix in _DECIDING)
+    digest = hashlib.sha256()
+    for path in files:
+        digest.update(
+            path.relative_to(package).as_posix().encode() + hashlib.sha256(path.read_bytes()).digest()
+        )
+    return f"fsid {fsid.__version__}, files {digest.hexdigest()[:8]}, NumPy {np.__version__}"
 
 
 def _gpu_number(ids: Sequence[Any]) -> int | None:
@@ -66,7 +97,10 @@ class RayCrew:
                 ray.init(address=address, log_to_driver=False, logging_level=logging.ERROR)
         except (ConnectionError, ValueError, RuntimeError) as error:
             reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-            raise FsidError(f"--ray {address}: no Ray cluster answers there ({reason})") from None
+            raise FsidError(
+                f"--ray {address}: no Ray cluster answers there ({reason}); if one is there, it may have "
+                "another version of Ray, or ask for its token (RAY_AUTH_MODE=token)"
+            ) from None
         cpus = int(ray.cluster_resources().get("CPU", 0))
         if cpus < size:
             self.stop()
@@ -85,7 +119,9 @@ class RayCrew:
     def start(self, worker: int) -> None:
         if worker in self._members:
             self._ray.kill(self._members[worker])
-        self._members[worker] = self._actor.remote(self._make_work, self._has_gpu, self._folder)
+        member: Any = self._actor.remote(self._make_work, self._has_gpu, self._folder)
+        self._members[worker] = member
+        self._pending[member.ready.remote(_identity())] = worker
 
     def send(self, worker: int, task: Any) -> None:
         self._pending[self._members[worker].do.remote(task)] = worker
@@ -98,13 +134,21 @@ class RayCrew:
         try:
             return self._ray.get(reference)
         except self._ray.exceptions.RayError as error:
-            return Lost(type(error).__name__)
+            return Lost(_reason(error))
 
     def stop(self) -> None:
         for member in getattr(self, "_members", {}).values():
             self._ray.kill(member)
         if self._owns:
             self._ray.shutdown()
+
+
+def _reason(error: Exception) -> str:
+    """The kind of a loss, its machine, and what was raised there while it started, as far as Ray says so."""
+    text = str(error)
+    machine = re.search(r"\bip[=:]\s*([\w.]+)", text)
+    raised = text.splitlines()[-1] if "creation task" in text else ""
+    return type(error).__name__ + (f" on {machine[1]}" if machine else "") + (f": {raised}" if raised else "")
 
 
 def _check_reachable(address: str) -> None:
