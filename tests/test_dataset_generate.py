@@ -21,6 +21,7 @@ import webdataset
 import yaml
 from PIL import Image
 
+from fsid.assets.survey import KNOWN
 from fsid.cli.main import main
 from fsid.config import load_settings, read_yaml
 from fsid.dataset import (
@@ -453,6 +454,53 @@ def test_a_folder_of_pictures_may_move(album: Path, tmp_path: Path):
     (moved / "coffee-0.png").rename(moved / "coffee.png")
     with pytest.raises(FsidError, match="already holds another dataset"):
         generate(out, replace(config, images=str(moved)), count=3)
+
+
+def own_files(folder: Path) -> list[str]:
+    """Settings of scenes that take meshes, textures and skies of `folder`, where it has some of each."""
+    for kind in ("meshes", "textures", "skies"):
+        (folder / kind).mkdir(parents=True, exist_ok=True)
+    for name in ("a", "b"):
+        (folder / "meshes" / f"{name}.obj").write_text(
+            "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 3 4\n"
+        )
+        Image.new("RGB", (16, 16), (120, 90, 60)).save(folder / "textures" / f"{name}_Color.png")
+        header = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 16 +X 32\n"
+        (folder / "skies" / f"{name}.hdr").write_bytes(header + bytes((90, 120, 150, 128)) * 512)
+    return [
+        f"scene.mesh_folders=[{folder / 'meshes'}]",
+        f"scene.texture_folders=[{folder / 'textures'}]",
+        f"scene.hdri_folder={folder / 'skies'}",
+        *("scene.objects=[1,1]", "scene.hdri_share=1", "checks.duplicate_bits=-1", "width=32", "height=32"),
+    ]
+
+
+def test_folders_of_meshes_textures_and_skies_may_move(tmp_path: Path):
+    out = tmp_path / "out"
+    generate(out, small(*own_files(tmp_path / "here")), count=1)
+    (tmp_path / "here").rename(tmp_path / "there")
+    moved = small(*own_files(tmp_path / "there"))
+    assert generate(out, moved, count=2, shard_size=16) == 1
+    with pytest.raises(FsidError, match=r"these differ: generate\.scene\.objects"):
+        generate(out, replace(moved, scene=replace(moved.scene, objects=(2, 2))), count=2)
+
+
+@pytest.mark.parametrize("file", ["meshes/b.obj", "textures/b_Color.png", "skies/b.hdr"])
+def test_scenes_of_other_files_do_not_go_on_a_dataset(tmp_path: Path, file: str):
+    """Whatever is drawn of a folder depends on all that is in it."""
+    out, own = tmp_path / "out", tmp_path / "own"
+    config = small(*own_files(own))
+    generate(out, config, count=1)
+    (own / "meshes" / "notes.txt").touch()  # not a file that scenes take
+    KNOWN.clear()
+    assert generate(out, config, count=2) == 1
+    (own / file).rename((own / file).with_name(f"c{Path(file).name[1:]}"))
+    KNOWN.clear()
+    for again in (lambda: generate(out, config, count=3), lambda: make_only(out, "2", None, None)):
+        with pytest.raises(
+            FsidError, match=r"out: was begun with other files than .*meshes, .*skies can give"
+        ):
+            again()
 
 
 def test_pairs_of_another_noise_do_not_go_on_a_dataset(album: Path, tmp_path: Path):

@@ -90,6 +90,13 @@ def _survey(path: str, progress: Callable[[int, int], None]) -> tuple[list[str],
     return usable, skipped
 
 
+def texture_files(path: str) -> dict[str, list[Path]]:
+    """The files of every usable texture set below a folder, by its name. FsidError as `survey_textures`."""
+    usable = set(survey_textures(path).usable)
+    found = {f"{PREFIX}{each.path}": list(each.files.values()) for each in sets_below(Path(path))}
+    return {name: files for name, files in found.items() if name in usable}
+
+
 def bake_texture(name: str, size: int) -> MaterialMaps:
     """The maps of "file:PATH": a set's common name, or a folder that holds one set. Raises FsidError."""
     try:

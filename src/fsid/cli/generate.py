@@ -84,7 +84,15 @@ def generate(
         quiet: No progress bar.
     """
     from fsid.config import given_keys
-    from fsid.dataset import Workforce, check_given, dataset_config, generate_config, is_begun, make_only
+    from fsid.dataset import (
+        Workforce,
+        check_given,
+        check_settings,
+        dataset_config,
+        generate_config,
+        is_begun,
+        make_only,
+    )
 
     given = overrides(
         set,
@@ -113,10 +121,11 @@ def generate(
         raise FsidError("--count: say how many pairs the dataset is to have, at least 1")
     seed = seed or 0
     workforce = Workforce(workers, ray, workers_per_gpu)
-    dataset = dataset_config(settings, seed)  # names what does not exist before a library is read
+    check_settings(settings)  # before a library is read
     note_extrapolation(settings.cameras, *settings.iso_range, quiet=quiet)
     if not settings.images:
         read_libraries(settings.scene, quiet=quiet)
+    dataset = dataset_config(settings, seed)
     if dry_run:
         Terminal(markup=False).print(_plan(out, settings, dataset, count, workforce), soft_wrap=True)
     else:

@@ -43,8 +43,8 @@ def preview(
     from fsid.dataset import (
         check_given,
         check_png,
+        check_settings,
         contact_sheet,
-        dataset_config,
         generate_config,
         save_png,
     )
@@ -53,7 +53,7 @@ def preview(
     given = overrides(set, width=width, height=height, variant=variant)
     settings = generate_config(config, [("width", 480), ("height", 270), *given])
     check_given(settings, given_keys(given), "preview")
-    dataset_config(settings, seed)
+    check_settings(settings)
     read_libraries(settings.scene, quiet=quiet)
     with progress_bar("scenes", "scenes", quiet=quiet) as progress:
         save_png(output, contact_sheet(settings, seed, count, progress=progress))

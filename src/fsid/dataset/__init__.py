@@ -3,7 +3,14 @@
 from fsid.dataset.attempt import Sample, sample_key
 from fsid.dataset.config import RENDERED, DatasetConfig, GenerateConfig, generate_config
 from fsid.dataset.estimate import Estimate, estimate
-from fsid.dataset.generate import Workforce, dataset_config, generate, is_begun, pairs_to_make
+from fsid.dataset.generate import (
+    Workforce,
+    check_settings,
+    dataset_config,
+    generate,
+    is_begun,
+    pairs_to_make,
+)
 from fsid.dataset.given import check_given
 from fsid.dataset.only import make_only
 from fsid.dataset.photos import find_photos, read_photo
@@ -23,6 +30,7 @@ __all__ = [
     "check_given",
     "check_pictures",
     "check_png",
+    "check_settings",
     "contact_sheet",
     "dataset_config",
     "encode",

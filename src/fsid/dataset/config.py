@@ -155,7 +155,8 @@ class DatasetConfig:
 
     pictures: how many there are in the folder `generate.images`; 0 for scenes. pictures_digest: of their
     names and sizes; "" for scenes, and unknown in what FSID wrote before it was recorded. profiles_digest: of
-    the noise in profiles that are files; "" where there is none, and likewise.
+    the noise in profiles that are files; "" where there is none, and likewise. files_digest: of the usable
+    files of the folders of meshes, textures and skies, by names and sizes; "" likewise.
     """
 
     seed: int
@@ -164,6 +165,7 @@ class DatasetConfig:
     pictures: int = 0
     pictures_digest: str = ""
     profiles_digest: str = ""
+    files_digest: str = ""
 
     def __post_init__(self) -> None:
         check_fields(self)

@@ -16,12 +16,12 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-from fsid.assets import sky_sources
 from fsid.assets.survey import KNOWN
 from fsid.config import check_fields, from_plain, read_yaml, save_settings, to_plain
 from fsid.dataset.card import CARD, check_card, write_card
 from fsid.dataset.config import RENDERED, DatasetConfig, GenerateConfig
 from fsid.dataset.crew import Crew, LocalCrew, run
+from fsid.dataset.origins import check_same_files, check_same_pictures, check_same_profiles, files_digest
 from fsid.dataset.pictures import find_pictures, pictures_digest
 from fsid.dataset.sample import encode, make_frame
 from fsid.dataset.settle import Settle, settle
@@ -34,6 +34,7 @@ from fsid.sensor import CameraProfile, load_bayer_profile
 from fsid.sensor.profiles import profiles_digest
 
 SHARD_SIZE = 16
+FOLDERS = ("mesh_folders", "texture_folders", "hdri_folder")
 SAMPLES_PER_WORKER = 320
 """After so many a worker is replaced, so that whatever a driver leaks stays small."""
 
@@ -168,7 +169,29 @@ def pairs_to_make(out: Path, dataset: DatasetConfig, count: int) -> tuple[int, i
 
 
 def dataset_config(config: GenerateConfig, seed: int, shard_size: int = 0) -> DatasetConfig:
-    """The identity of the dataset of (config, seed); FsidError where what it names does not exist."""
+    """The identity of the dataset of (config, seed); FsidError where what it names does not exist.
+
+    Surveys the folders of meshes, textures and skies, which takes minutes the first time.
+    """
+    check_settings(config)
+    pairs = config.pairs_per_frame
+    shard_size = shard_size or -(-SHARD_SIZE // pairs) * pairs
+    if shard_size < 1 or shard_size % pairs:
+        raise FsidError(f"shard size {shard_size}: is not a multiple of the {pairs} pairs of a frame")
+    pictures = find_pictures(Path(config.images)) if config.images else []
+    return DatasetConfig(
+        seed,
+        shard_size,
+        config,
+        pictures=len(pictures),
+        pictures_digest=pictures_digest(pictures) if pictures else "",
+        profiles_digest=profiles_digest(config.cameras),
+        files_digest=files_digest(config),
+    )
+
+
+def check_settings(config: GenerateConfig) -> None:
+    """FsidError where what `config` names does not exist, or its parts do not agree; reads no large file."""
     for camera in config.cameras:
         _check_noise(load_bayer_profile(camera), config.iso_range[1])
     check_cameras(config)
@@ -176,22 +199,12 @@ def dataset_config(config: GenerateConfig, seed: int, shard_size: int = 0) -> Da
     for folder in (*scene.mesh_folders, *scene.texture_folders, scene.hdri_folder):
         if not Path(folder).exists():
             raise FsidError(f"{folder}: there is no such folder")
-    if scene.hdri_folder and scene.background.kind_shares[-1] and not config.images:
-        sky_sources(scene.hdri_folder)
     if config.crops > config.windows and config.checks.duplicate_bits >= 0 and not config.images:
         raise FsidError(
             f"crops: {config.crops}, but crop_width and crop_height leave {config.windows} different ones, "
             "and near-duplicates are refused"
         )
-    pictures = find_pictures(Path(config.images)) if config.images else []
-    check_task(config, pictures)
-    pairs = config.pairs_per_frame
-    shard_size = shard_size or -(-SHARD_SIZE // pairs) * pairs
-    if shard_size < 1 or shard_size % pairs:
-        raise FsidError(f"shard size {shard_size}: is not a multiple of the {pairs} pairs of a frame")
-    digest = pictures_digest(pictures) if pictures else ""
-    noise = profiles_digest(config.cameras)
-    return DatasetConfig(seed, shard_size, config, len(pictures), digest, noise)
+    check_task(config, find_pictures(Path(config.images)) if config.images else [])
 
 
 def _check_noise(profile: CameraProfile, highest_iso: float) -> None:
@@ -242,13 +255,15 @@ def is_begun(out: Path, dataset: DatasetConfig) -> bool:
     here = _used(dataset if there.pictures_digest else replace(dataset, pictures_digest=""))
     if not there.profiles_digest:
         here = replace(here, profiles_digest="")
-    if there.pictures_digest and there.pictures_digest == here.pictures_digest:  # their folder may move
-        here = replace(here, generate=replace(here.generate, images=there.generate.images))
+    if not there.files_digest:
+        here = replace(here, files_digest="")
+    here = _in_places_of(there, here)
     if there == here or not (any(out.glob("shard-*.tar")) or any(out.glob("*.clean.dng"))):
         return there == here
     if there.generate == here.generate and there.seed == here.seed:
         check_same_pictures(out, there)
         check_same_profiles(out, there)
+        check_same_files(out, there, here.files_digest)
     keys = ", ".join(_differing(to_plain(there), to_plain(here)))
     raise FsidError(
         f"{out}: already holds another dataset; these differ: {keys}. "
@@ -256,28 +271,15 @@ def is_begun(out: Path, dataset: DatasetConfig) -> bool:
     )
 
 
-def check_same_pictures(out: Path, dataset: DatasetConfig) -> None:
-    """FsidError unless the pictures of `dataset`, in `out`, are those that it was begun with, if known."""
-    if not dataset.generate.images:
-        return
-    pictures = find_pictures(Path(dataset.generate.images))
-    digest = dataset.pictures_digest and pictures_digest(pictures)
-    if (len(pictures), digest) != (dataset.pictures, dataset.pictures_digest):
-        raise FsidError(
-            f"{dataset.generate.images}: holds other pictures than those that {out} was begun with (names or "
-            f"sizes differ; {dataset.pictures} then, {len(pictures)} now); "
-            "put those back, or use another folder"
-        )
-
-
-def check_same_profiles(out: Path, dataset: DatasetConfig) -> None:
-    """FsidError unless the profiles of `dataset`, in `out`, say the noise that it began with, if known."""
-    cameras = dataset.generate.cameras
-    if dataset.profiles_digest not in ("", profiles_digest(cameras)):
-        raise FsidError(
-            f"{out}: was begun with another noise than {', '.join(cameras)} says now; "
-            "put the file back as it was, or use another folder"
-        )
+def _in_places_of(there: DatasetConfig, here: DatasetConfig) -> DatasetConfig:
+    """`here` with the folders of `there` where they hold the same: folders may move."""
+    config = here.generate
+    if there.pictures_digest and there.pictures_digest == here.pictures_digest:
+        config = replace(config, images=there.generate.images)
+    if there.files_digest and there.files_digest == here.files_digest:
+        folders = {key: getattr(there.generate.scene, key) for key in FOLDERS}
+        config = replace(config, scene=replace(config.scene, **folders))
+    return replace(here, generate=config)
 
 
 def _used(dataset: DatasetConfig) -> DatasetConfig:

@@ -5,7 +5,8 @@ from fsid.assets.sources.library import (
     MeshSource,
     load_source,
     mesh_sources,
+    split_source,
     survey_meshes,
 )
 
-__all__ = ["PREFIX", "MeshSource", "load_source", "mesh_sources", "survey_meshes"]
+__all__ = ["PREFIX", "MeshSource", "load_source", "mesh_sources", "split_source", "survey_meshes"]

@@ -114,7 +114,7 @@ def load_source(name: str) -> Mesh:
 
 
 def _measures(name: str) -> np.ndarray:
-    found = load_measures(_key(*_split(name)))
+    found = load_measures(_key(*split_source(name)))
     return measures(_mesh(name)) if found is None else found
 
 
@@ -129,7 +129,7 @@ def _key(path: Path, member: str) -> str:
 
 def _mesh(name: str) -> Mesh:
     """From the cache, or made and put there. Raises RefusedError."""
-    path, member = _split(name)
+    path, member = split_source(name)
     key = _key(path, member)
     mesh = load_mesh(key)
     if mesh is None:
@@ -144,7 +144,8 @@ def _mesh(name: str) -> Mesh:
     return mesh
 
 
-def _split(name: str) -> tuple[Path, str]:
+def split_source(name: str) -> tuple[Path, str]:
+    """The file of "file:PATH" or "file:PATH!MEMBER", and the member of the library, "" for none."""
     text = name.removeprefix(PREFIX)
     parts = re.fullmatch(rf"(.*?{re.escape(LIBRARY_SUFFIX)})!(.+)", text, re.IGNORECASE | re.DOTALL)
     return (Path(parts[1]), parts[2]) if parts else (Path(text), "")
