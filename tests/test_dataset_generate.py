@@ -503,6 +503,17 @@ def test_scenes_of_other_files_do_not_go_on_a_dataset(tmp_path: Path, file: str)
             again()
 
 
+def test_broken_panoramas_are_named_before_a_dataset_begins(tmp_path: Path, refused: Callable[..., str]):
+    """A scene that has one would end the run hours later, and a mended one is another file."""
+    out, own = tmp_path / "out", tmp_path / "own"
+    settings = own_files(own)
+    (own / "skies" / "b.hdr").write_bytes((own / "skies" / "a.hdr").read_bytes()[:-9])
+    told = refused("generate", str(out), "--count", "1", "--set", *settings)
+    assert "1 of 2 panoramas cannot be used, mend them or move them elsewhere: " in told
+    assert "b.hdr: is no complete Radiance .hdr picture" in told
+    assert not out.exists()
+
+
 def test_pairs_of_another_noise_do_not_go_on_a_dataset(album: Path, tmp_path: Path):
     """A profile that was calibrated again has its name, and other noise."""
     out, mine, profile = tmp_path / "out", tmp_path / "mine.yaml", load_profile("pixel6")

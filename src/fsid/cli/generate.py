@@ -137,9 +137,14 @@ def generate(
 
 def _check_sources(settings: GenerateConfig, count: int, workforce: Workforce, *, quiet: bool) -> None:
     """Before anything is written: the pictures of all frames, decoded on as many cores as there are workers,
-    or the GPUs of these."""
+    or the panoramas and the GPUs of these."""
     from fsid.dataset import check_pictures, find_pictures
-    from fsid.render import gpu_device
+    from fsid.render import check_skies, gpu_device
+
+    scene = settings.scene
+    if scene.hdri_folder and scene.background.kind_shares[-1] and not settings.images:
+        with progress_bar(f"checking {scene.hdri_folder}", "panoramas", quiet=quiet) as progress:
+            check_skies(scene.hdri_folder, progress)
 
     if settings.images:
         pictures = find_pictures(Path(settings.images))[: -(-count // settings.pairs_per_frame)]

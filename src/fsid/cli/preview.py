@@ -45,6 +45,7 @@ def preview(
         check_png,
         check_settings,
         contact_sheet,
+        dataset_config,
         generate_config,
         save_png,
     )
@@ -55,5 +56,6 @@ def preview(
     check_given(settings, given_keys(given), "preview")
     check_settings(settings)
     read_libraries(settings.scene, quiet=quiet)
+    dataset_config(settings, seed)
     with progress_bar("scenes", "scenes", quiet=quiet) as progress:
         save_png(output, contact_sheet(settings, seed, count, progress=progress))

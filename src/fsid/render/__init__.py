@@ -3,5 +3,6 @@
 from fsid.render.context import GlInfo, egl_devices, gpu_device
 from fsid.render.frame import Frame
 from fsid.render.renderer import Renderer
+from fsid.render.sky import check_skies
 
-__all__ = ["Frame", "GlInfo", "Renderer", "egl_devices", "gpu_device"]
+__all__ = ["Frame", "GlInfo", "Renderer", "check_skies", "egl_devices", "gpu_device"]

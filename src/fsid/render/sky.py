@@ -11,13 +11,14 @@ scene.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
-from fsid.assets.skies import XYZE, exr_size, size_flaw
+from fsid.assets.skies import XYZE, exr_size, size_flaw, sky_sources
+from fsid.counted import counted
 from fsid.errors import FsidError
 from fsid.files import read_whole
 from fsid.scene.colour import LUMINANCE
@@ -32,6 +33,8 @@ _THIN_CLOUD, _THICK_CLOUD = np.array([1.6, 1.75, 1.95]), np.array([0.75, 0.85, 1
 _GROUND = 0.25
 _CLOUD_ROWS = 8
 """Rows of clouds drawn at once: as many as stay in the processor's cache."""
+_NAMED = 5
+"""So many unusable panoramas are named."""
 _LEAST_LIGHT = 1e-6
 """Mean of the upper half of a picture, relative to its brightest value, that is no darkness."""
 
@@ -39,6 +42,26 @@ _LEAST_LIGHT = 1e-6
 def panorama(sky: Sky) -> np.ndarray:
     """(H, 2 H, 3) float32 radiance. Raises FsidError for a source that cannot be read."""
     return _drawn(sky) if sky.source == "procedural" else _scaled(sky, _pictured(sky))
+
+
+def check_skies(folder: str, progress: Callable[[int, int], None] = lambda done, total: None) -> None:
+    """Decode every panorama of a folder once; FsidError that names those which no scene could have.
+
+    One of 2048 x 1024 pixels takes 0.1 s of a core, of 4096 x 2048 up to 0.8 s, of 8192 x 4096 up to 4 s.
+    """
+    sources, faults = sky_sources(folder), []
+    for done, source in enumerate(sources, 1):
+        try:
+            _decoded(Path(source.removeprefix("file:")))
+        except FsidError as error:
+            faults.append(str(error))
+        progress(done, len(sources))
+    if faults:
+        more = f" and {len(faults) - _NAMED} more" if len(faults) > _NAMED else ""
+        raise FsidError(
+            f"{len(faults)} of {counted(len(sources), 'panorama')} cannot be used, mend them or move them "
+            f"elsewhere: {'; '.join(faults[:_NAMED])}{more}"
+        )
 
 
 @lru_cache(maxsize=2)
@@ -134,9 +157,13 @@ def _lattice(values: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
 def _read(path: Path, changed_ns: int, size: int) -> np.ndarray:
     """(H, 2 H, 3) float32 >= 0, H <= MOST_HEIGHT. changed_ns, size: of the file, which is read again where
     they differ from those of the pictures that are kept for the next image."""
-    picture = _read_exr(path) if path.suffix.lower() == ".exr" else _read_hdr(path)
+    picture = _decoded(path)
     picture.flags.writeable = False
     return picture
+
+
+def _decoded(path: Path) -> np.ndarray:
+    return _read_exr(path) if path.suffix.lower() == ".exr" else _read_hdr(path)
 
 
 def _read_hdr(path: Path) -> np.ndarray:
