@@ -20,7 +20,7 @@ from fsid.config import given_keys, load_settings
 from fsid.dataset import GenerateConfig, Sample, check_given, encode, make_sample, read_photo
 from fsid.dataset.attempt import _half_precision
 from fsid.dataset.given import _FIXED, _NEEDS
-from fsid.dataset.pictures import read_exr
+from fsid.dataset.pictures import check_pictures, find_pictures, read_exr
 from fsid.dataset.tasks import BURST_FRAMES, scene_config, smaller, views_of_scene
 from fsid.errors import FsidError
 from fsid.render import Renderer
@@ -193,6 +193,14 @@ def test_a_linear_render_takes_the_exact_linear_path(
     colour = np.random.default_rng(np.random.SeedSequence(0, spawn_key=(0, 0, 3, 0)))
     expected = clean_from_linear(colour, light.astype(np.float32) * gain, load_profile("pixel6"))
     np.testing.assert_array_equal(sample.clean.mosaic, expected.mosaic)
+
+
+def test_a_black_render_is_named_before_a_dataset_begins(tmp_path: Path) -> None:
+    """Of one that is dim the exposure makes an image."""
+    write_exr(tmp_path / "dim.exr", np.full((64, 96, 3), 1e-30, np.float32))
+    write_exr(tmp_path / "off.exr", np.zeros((64, 96, 3), np.float32))
+    with pytest.raises(FsidError, match=r"1 of 2 pictures cannot be used.*: \S*off\.exr: is black all over$"):
+        check_pictures(find_pictures(tmp_path), 1)
 
 
 def write_layers(path: Path, layers: dict[str, str], in_parts: bool) -> None:
