@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import threading
 from pathlib import Path
 
@@ -15,7 +16,7 @@ pytest.importorskip("ray")
 
 from fsid.dataset import GenerateConfig, Workforce, generate
 from fsid.dataset.crew import Ready
-from fsid.dataset.ray_crew import _identity, _Member, _reason
+from fsid.dataset.ray_crew import _identity, _lacking, _Member, _reason
 from fsid.errors import FsidError
 
 
@@ -102,6 +103,26 @@ def test_a_machine_without_the_folder_is_one_line(tmp_path: Path) -> None:
     result = member.do("task")
     assert isinstance(result, FsidError)
     assert f"cannot work in {tmp_path / 'gone'} (No such file" in str(result)
+
+
+def test_a_cluster_without_places_for_all_workers_is_one_line() -> None:
+    """Ray would wait for ever for a GPU that no machine has."""
+    assert _lacking({"CPU": 16.0}, 17, 0) == (
+        "--workers 17: the Ray cluster has 16 CPUs, one per worker is needed"
+    )
+    assert "has 0 GPUs for 4 workers each (--workers-per-gpu)" in _lacking({"CPU": 16.0}, 1, 4)
+    assert "has 1 GPU for 4 workers each" in _lacking({"CPU": 16.0, "GPU": 1.0}, 5, 4)
+    assert _lacking({"CPU": 16.0, "GPU": 2.0}, 8, 4) == _lacking({"CPU": 16.0}, 16, 0) == ""
+
+
+def test_bad_input_is_named_with_its_machine(tmp_path: Path) -> None:
+    """The one where the command was typed may have the file."""
+
+    def work(task: str) -> None:
+        raise FsidError(f"{task}: cannot be opened")
+
+    result = _Member(lambda gpu: work, False, str(tmp_path)).do("a.obj")
+    assert str(result) == f"a.obj: cannot be opened (on {socket.gethostname()})"
 
 
 def test_a_machine_with_another_fsid_is_one_line(tmp_path: Path) -> None:

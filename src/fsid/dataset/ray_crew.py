@@ -12,7 +12,7 @@ import logging
 import os
 import re
 import socket
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 import fsid
+from fsid.counted import counted
 from fsid.dataset.crew import Lost, MakeWork, Ready, do_task, thread_limits
 from fsid.errors import FsidError
 
@@ -57,7 +58,10 @@ class _Member:
                 f"--ray: {socket.gethostname()} cannot work in {self._folder} ({error.strerror}); "
                 "run the command in a folder that all machines have"
             ) from None
-        return self._work(task)
+        try:
+            return self._work(task)
+        except FsidError as error:  # of a file that the others may have
+            raise FsidError(f"{error} (on {socket.gethostname()})") from None
 
 
 @cache
@@ -83,7 +87,7 @@ class RayCrew:
     """Actors of one CPU each on a cluster. address: "auto", "ray://HOST:10001", or "local" for one here.
 
     workers_per_gpu: Ray gives every worker 1 / workers_per_gpu of a GPU; 0 asks for none.
-    Raises FsidError where no cluster answers or the cluster has fewer CPUs than `size`.
+    Raises FsidError where no cluster answers, or it has too few CPUs or GPUs for `size`.
     """
 
     def __init__(self, address: str, size: int, make_work: MakeWork, workers_per_gpu: int = 0) -> None:
@@ -101,10 +105,10 @@ class RayCrew:
                 f"--ray {address}: no Ray cluster answers there ({reason}); if one is there, it may have "
                 "another version of Ray, or ask for its token (RAY_AUTH_MODE=token)"
             ) from None
-        cpus = int(ray.cluster_resources().get("CPU", 0))
-        if cpus < size:
+        lacking = _lacking(ray.cluster_resources(), size, workers_per_gpu)
+        if lacking:
             self.stop()
-            raise FsidError(f"--workers {size}: the Ray cluster has {cpus} CPUs, one per worker is needed")
+            raise FsidError(lacking)
         share = 1 / workers_per_gpu if workers_per_gpu else 0
         self._has_gpu = share > 0
         threads = {"env_vars": thread_limits(1)}
@@ -141,6 +145,19 @@ class RayCrew:
             self._ray.kill(member)
         if self._owns:
             self._ray.shutdown()
+
+
+def _lacking(resources: Mapping[str, float], size: int, workers_per_gpu: int) -> str:
+    """Why a cluster of so many "CPU" and "GPU" has no place for `size` workers, "" where it has."""
+    cpus, gpus = (int(resources.get(key, 0)) for key in ("CPU", "GPU"))
+    if cpus < size:
+        return f"--workers {size}: the Ray cluster has {counted(cpus, 'CPU')}, one per worker is needed"
+    if workers_per_gpu and gpus * workers_per_gpu < size:
+        return (
+            f"--workers {size}: the Ray cluster has {counted(gpus, 'GPU')} "
+            f"for {workers_per_gpu} workers each (--workers-per-gpu)"
+        )
+    return ""
 
 
 def _reason(error: Exception) -> str:
