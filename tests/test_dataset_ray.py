@@ -5,7 +5,10 @@ from __future__ import annotations
 import os
 import signal
 import socket
+import subprocess
+import sys
 import threading
+import time
 from pathlib import Path
 
 import numpy as np
@@ -72,6 +75,21 @@ def test_lost_actors_change_nothing(tmp_path: Path) -> None:
         p.name: p.read_bytes() for p in calm.glob("*.tar")
     }
     assert not list(out.glob(".*.part"))
+
+
+def test_sigterm_leaves_nothing_half_written(photos: Path, tmp_path: Path) -> None:
+    """As without Ray, which has handlers of its own for it."""
+    command = [sys.executable, "-m", "fsid", "generate", str(tmp_path), "--count", "4000", "--ray", "local"]
+    settings = ["--images", str(photos), "--quiet", "--set", "width=32", "height=32", "noise_levels=1000"]
+    process = subprocess.Popen([*command, *settings], stderr=subprocess.PIPE, text=True)
+    while not list(tmp_path.glob(".shard-*.part")):
+        assert process.poll() is None, process.communicate()
+        time.sleep(0.05)
+    process.send_signal(signal.SIGTERM)
+    told = process.communicate()[1]
+    assert process.returncode == 143
+    assert told.split("fsid: ")[1] == "terminated; the same command goes on from what is finished\n"
+    assert [path.name for path in tmp_path.iterdir()] == ["config.yaml"]
 
 
 @pytest.mark.filterwarnings("ignore")

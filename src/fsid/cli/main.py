@@ -77,18 +77,15 @@ EXTRAS = {
 }
 
 
-class _Terminated(KeyboardInterrupt):
-    """A signal of ENDING: cleans up as after Ctrl-C."""
-
-    def __init__(self, number: int) -> None:
-        super().__init__()
-        self.code = 128 + number
+_received: list[int] = []
+"""Signals of ENDING since the command began."""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run one command, in the main thread; exit code 0 when done, 2 for bad input or a full disk, 130 after
     Ctrl-C, 143 after SIGTERM, 129 after SIGHUP, 141 when nobody reads on."""
     _open_closed()
+    _received.clear()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # a file's name may be no text in its encoding
             stream.reconfigure(errors="backslashreplace")
@@ -127,9 +124,11 @@ def _open_closed() -> None:
 
 
 def _terminate(number: int, frame: FrameType | None) -> None:
+    """Cleans up as after Ctrl-C. Ray passes on no exception of a kind of its own, so the number is kept."""
     for ending in ENDING:
         signal.signal(ending, signal.SIG_IGN)  # a second one must not end the cleaning up
-    raise _Terminated(number)
+    _received.append(number)
+    raise KeyboardInterrupt
 
 
 def _run(arguments: Sequence[str] | None) -> None:
@@ -164,10 +163,8 @@ def _run(arguments: Sequence[str] | None) -> None:
         if not str(error).startswith(SYMLINK_LOOP):
             raise
         _fail(str(error))
-    except KeyboardInterrupt as signalled:
-        what, code = (
-            ("terminated", signalled.code) if isinstance(signalled, _Terminated) else ("interrupted", 130)
-        )
+    except KeyboardInterrupt:
+        what, code = ("terminated", 128 + _received[0]) if _received else ("interrupted", 130)
         goes_on = set(sys.argv[1:2] if arguments is None else arguments[:1]) & RESUMABLE
         hint = "; the same command goes on from what is finished" if goes_on else ""
         _tell(Text(f"fsid: {what}{hint}"))

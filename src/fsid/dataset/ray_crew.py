@@ -11,8 +11,11 @@ import hashlib
 import logging
 import os
 import re
+import signal
 import socket
-from collections.abc import Mapping, Sequence
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -98,7 +101,8 @@ class RayCrew:
         self._owns = not ray.is_initialized()
         try:
             if self._owns:
-                ray.init(address=address, log_to_driver=False, logging_level=logging.ERROR)
+                with _own_sigterm():
+                    ray.init(address=address, log_to_driver=False, logging_level=logging.ERROR)
         except (ConnectionError, ValueError, RuntimeError) as error:
             reason = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise FsidError(
@@ -145,6 +149,17 @@ class RayCrew:
             self._ray.kill(member)
         if self._owns:
             self._ray.shutdown()
+
+
+@contextmanager
+def _own_sigterm() -> Iterator[None]:
+    """The handler of SIGTERM stays: Ray's, also below Python's, end the process before it can clear up."""
+    handler = signal.getsignal(signal.SIGTERM)
+    try:
+        yield
+    finally:
+        if handler is not None and threading.current_thread() is threading.main_thread():
+            signal.signal(signal.SIGTERM, handler)
 
 
 def _lacking(resources: Mapping[str, float], size: int, workers_per_gpu: int) -> str:
