@@ -158,6 +158,9 @@ def test_what_mitsuba_cannot_do_is_said():
         renderer(1).render(empty_room(camera=bent))
     with pytest.raises(FsidError, match="1 cameras"):
         renderer(1).render(empty_room(), 1)
+    wide = Light("spot", (0.0, 0.0, 1.5), (0.0, 0.0, -1.0), (2.0, 2.0, 2.0), 0.0, 200.0)
+    with pytest.raises(FsidError, match="a spot of 200 degrees"):
+        renderer(1).render(empty_room(wide))
     with pytest.raises(FsidError, match="samples"):
         ReferenceRenderer(samples=0)
 

@@ -30,6 +30,10 @@ def emitters(mi: Any, light: Light, name: str) -> dict[str, Any]:
         return {name: _area(mi, light)}
     if light.kind not in ("point", "spot", "sun"):
         raise FsidError(f"scene.lights: kind '{light.kind}' is not known to the reference renderer")
+    if light.kind == "spot" and light.cone_deg > 180:
+        raise FsidError(
+            f"scene.lights: a spot of {light.cone_deg:g} degrees; the reference renderer's reach 180 at most"
+        )
     spread = _cloud() * light.radius_m if light.radius_m > 0 else np.zeros((1, 3))
     rgb = np.array(light.colour) / len(spread)
     kinds: dict[str, Callable[..., dict[str, Any]]] = {
