@@ -37,7 +37,6 @@ def evaluate(
             as of fsid denoise; their names in the results say so.
         quiet: No progress bar.
     """
-    from fsid.evaluate.compare import perfect_note
     from fsid.evaluate.models import evaluate_models, write_comparison
     from fsid.sensor import profile_names
 
@@ -46,8 +45,6 @@ def evaluate(
     notes: list[str] = []
     with progress_bar("measuring", "captures", quiet=quiet) as progress:
         comparison = evaluate_models(testset, model, ensemble=ensemble, progress=progress, note=notes.append)
-    if perfect := perfect_note(comparison.images):
-        notes.append(perfect)
     for line in notes:
         note(line, quiet=quiet)
     made = comparison.testset

@@ -141,11 +141,10 @@ def _check_sources(settings: GenerateConfig, count: int, workforce: Workforce, *
     from fsid.dataset import check_pictures, find_pictures
     from fsid.render import check_skies, gpu_device
 
-    scene = settings.scene
-    if scene.hdri_folder and scene.background.kind_shares[-1] and not settings.images:
-        with progress_bar(f"checking {scene.hdri_folder}", "panoramas", quiet=quiet) as progress:
-            check_skies(scene.hdri_folder, progress)
-
+    skies = settings.scene.panoramas
+    if skies and not settings.images:
+        with progress_bar(f"checking {skies}", "panoramas", quiet=quiet) as progress:
+            check_skies(skies, progress)
     if settings.images:
         pictures = find_pictures(Path(settings.images))[: -(-count // settings.pairs_per_frame)]
         with progress_bar(f"checking {settings.images}", "pictures", quiet=quiet) as progress:

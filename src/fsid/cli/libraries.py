@@ -29,9 +29,9 @@ def read_libraries(config: SceneConfig, *, quiet: bool) -> None:
         with progress_bar(f"reading {folder}", "texture sets", quiet=quiet) as progress:
             sets = survey_textures(folder, progress)
         _tell(f"{folder}: {counted(len(sets.usable), 'texture set')}", sets.skipped, quiet=quiet)
-    if config.hdri_folder and config.background.kind_shares[-1]:  # else there is no sky
-        skies = survey_skies(config.hdri_folder)
-        _tell(f"{config.hdri_folder}: {counted(len(skies.usable), 'panorama')}", skies.skipped, quiet=quiet)
+    if config.panoramas:
+        skies = survey_skies(config.panoramas)
+        _tell(f"{config.panoramas}: {counted(len(skies.usable), 'panorama')}", skies.skipped, quiet=quiet)
 
 
 def _tell(found: str, skipped: Sequence[tuple[str, str]], *, quiet: bool) -> None:

@@ -21,7 +21,13 @@ from fsid.config import check_fields, from_plain, read_yaml, save_settings, to_p
 from fsid.dataset.card import CARD, check_card, write_card
 from fsid.dataset.config import RENDERED, DatasetConfig, GenerateConfig
 from fsid.dataset.crew import Crew, LocalCrew, run
-from fsid.dataset.origins import check_same_files, check_same_pictures, check_same_profiles, files_digest
+from fsid.dataset.origins import (
+    as_far_as_known,
+    check_same_origins,
+    files_digest,
+    in_places_of,
+    source_folders,
+)
 from fsid.dataset.pictures import find_pictures, pictures_digest
 from fsid.dataset.sample import encode, make_frame
 from fsid.dataset.settle import Settle, settle
@@ -34,7 +40,6 @@ from fsid.sensor import CameraProfile, load_bayer_profile
 from fsid.sensor.profiles import profiles_digest
 
 SHARD_SIZE = 16
-FOLDERS = ("mesh_folders", "texture_folders", "hdri_folder")
 SAMPLES_PER_WORKER = 320
 """After so many a worker is replaced, so that whatever a driver leaks stays small."""
 
@@ -196,7 +201,7 @@ def check_settings(config: GenerateConfig) -> None:
         _check_noise(load_bayer_profile(camera), config.iso_range[1])
     check_cameras(config)
     scene = config.scene
-    for folder in (*scene.mesh_folders, *scene.texture_folders, scene.hdri_folder):
+    for folder in source_folders(scene):
         if not Path(folder).exists():
             raise FsidError(f"{folder}: there is no such folder")
     if config.crops > config.windows and config.checks.duplicate_bits >= 0 and not config.images:
@@ -252,34 +257,16 @@ def is_begun(out: Path, dataset: DatasetConfig) -> bool:
     if not file.exists():
         return False
     there = _used(from_plain(DatasetConfig, read_yaml(file), source=str(file)))
-    here = _used(dataset if there.pictures_digest else replace(dataset, pictures_digest=""))
-    if not there.profiles_digest:
-        here = replace(here, profiles_digest="")
-    if not there.files_digest:
-        here = replace(here, files_digest="")
-    here = _in_places_of(there, here)
+    here = in_places_of(there, as_far_as_known(there, _used(dataset)))
     if there == here or not (any(out.glob("shard-*.tar")) or any(out.glob("*.clean.dng"))):
         return there == here
     if there.generate == here.generate and there.seed == here.seed:
-        check_same_pictures(out, there)
-        check_same_profiles(out, there)
-        check_same_files(out, there, here.files_digest)
+        check_same_origins(out, there)
     keys = ", ".join(_differing(to_plain(there), to_plain(here)))
     raise FsidError(
         f"{out}: already holds another dataset; these differ: {keys}. "
         "Use another folder, or the same settings"
     )
-
-
-def _in_places_of(there: DatasetConfig, here: DatasetConfig) -> DatasetConfig:
-    """`here` with the folders of `there` where they hold the same: folders may move."""
-    config = here.generate
-    if there.pictures_digest and there.pictures_digest == here.pictures_digest:
-        config = replace(config, images=there.generate.images)
-    if there.files_digest and there.files_digest == here.files_digest:
-        folders = {key: getattr(there.generate.scene, key) for key in FOLDERS}
-        config = replace(config, scene=replace(config.scene, **folders))
-    return replace(here, generate=config)
 
 
 def _used(dataset: DatasetConfig) -> DatasetConfig:

@@ -10,7 +10,7 @@ from fsid.config import from_plain, read_yaml
 from fsid.dataset.attempt import SAMPLE_KEY, Sample, sample_key
 from fsid.dataset.config import DatasetConfig, GenerateConfig
 from fsid.dataset.generate import dataset_config
-from fsid.dataset.origins import check_same_files, check_same_pictures, check_same_profiles, files_digest
+from fsid.dataset.origins import check_same_origins
 from fsid.dataset.sample import encode, make_sample, remake
 from fsid.dataset.shards import read_record, read_records, shard_path
 from fsid.dataset.worker import rendering
@@ -55,9 +55,7 @@ def _from_key(
         dataset = from_plain(DatasetConfig, read_yaml(file), source=str(file))
         if config not in (None, dataset.generate) or seed not in (None, dataset.seed):
             raise FsidError(f"{out}: holds a dataset of other settings or another seed; leave them out")
-        check_same_pictures(out, dataset)
-        check_same_profiles(out, dataset)
-        check_same_files(out, dataset, files_digest(dataset.generate))
+        check_same_origins(out, dataset)
         config, seed = dataset.generate, dataset.seed
         shard = shard_path(out, index // dataset.shard_size)
         records = read_records(shard) if shard.exists() else iter(())

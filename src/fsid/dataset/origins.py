@@ -11,7 +11,9 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from fsid.assets import mesh_sources, sky_sources
 from fsid.assets.sources import PREFIX, split_source
@@ -21,6 +23,9 @@ from fsid.dataset.pictures import find_pictures, pictures_digest
 from fsid.errors import FsidError
 from fsid.scene import SceneConfig
 from fsid.sensor.profiles import profiles_digest
+
+_DIGESTS = ("pictures_digest", "profiles_digest", "files_digest")
+_FOLDERS = ("mesh_folders", "texture_folders", "hdri_folder")
 
 
 def files_digest(config: GenerateConfig) -> str:
@@ -37,9 +42,9 @@ def _files(scene: SceneConfig) -> Iterator[bytes]:
     for folder in scene.texture_folders:
         for name, files in texture_files(folder).items():
             yield _fact(folder, name, *files)
-    if scene.hdri_folder and scene.background.kind_shares[-1]:  # else there is no sky
-        for name in sky_sources(scene.hdri_folder):
-            yield _fact(scene.hdri_folder, name, Path(name.removeprefix(PREFIX)))
+    if scene.panoramas:
+        for name in sky_sources(scene.panoramas):
+            yield _fact(scene.panoramas, name, Path(name.removeprefix(PREFIX)))
 
 
 def _fact(folder: str, name: str, *files: Path) -> bytes:
@@ -47,21 +52,41 @@ def _fact(folder: str, name: str, *files: Path) -> bytes:
     return b"%s\0%d\0" % (os.fsencode(os.path.relpath(name.removeprefix(PREFIX), folder)), sizes)
 
 
-def check_same_files(out: Path, dataset: DatasetConfig, digest: str) -> None:
-    """FsidError unless the files of the folders of `dataset`, in `out`, are those that it was begun with, if
-    known. digest: of those that are there now."""
-    if dataset.files_digest in ("", digest):
-        return
-    scene = dataset.generate.scene
-    folders = ", ".join(filter(None, (*scene.mesh_folders, *scene.texture_folders, scene.hdri_folder)))
-    raise FsidError(
-        f"{out}: was begun with other files than {folders} can give now (names or sizes differ); "
-        "put those back, or use another folder"
-    )
+def source_folders(scene: SceneConfig) -> tuple[str, ...]:
+    """The folders of meshes, textures and skies."""
+    return tuple(filter(None, (*scene.mesh_folders, *scene.texture_folders, scene.hdri_folder)))
 
 
-def check_same_pictures(out: Path, dataset: DatasetConfig) -> None:
-    """FsidError unless the pictures of `dataset`, in `out`, are those that it was begun with, if known."""
+def as_far_as_known(there: DatasetConfig, here: DatasetConfig) -> DatasetConfig:
+    """`here` without the digests that `there` lacks: what FSID wrote before they were recorded."""
+    unknown: dict[str, Any] = {key: "" for key in _DIGESTS if not getattr(there, key)}
+    return replace(here, **unknown)
+
+
+def in_places_of(there: DatasetConfig, here: DatasetConfig) -> DatasetConfig:
+    """`here` with the folders of `there` where they hold the same: folders may move."""
+    config = here.generate
+    if there.pictures_digest and there.pictures_digest == here.pictures_digest:
+        config = replace(config, images=there.generate.images)
+    if there.files_digest and there.files_digest == here.files_digest:
+        folders = {key: getattr(there.generate.scene, key) for key in _FOLDERS}
+        config = replace(config, scene=replace(config.scene, **folders))
+    return replace(here, generate=config)
+
+
+def check_same_origins(out: Path, dataset: DatasetConfig) -> None:
+    """FsidError unless the pictures, files and profiles of `dataset`, in `out`, are those that it was begun
+    with, if known."""
+    _check_pictures(out, dataset)
+    _check_profiles(out, dataset)
+    if dataset.files_digest not in ("", files_digest(dataset.generate)):
+        raise FsidError(
+            f"{out}: was begun with other files than {', '.join(source_folders(dataset.generate.scene))} can "
+            "give now (names or sizes differ); put those back, or use another folder"
+        )
+
+
+def _check_pictures(out: Path, dataset: DatasetConfig) -> None:
     if not dataset.generate.images:
         return
     pictures = find_pictures(Path(dataset.generate.images))
@@ -74,8 +99,7 @@ def check_same_pictures(out: Path, dataset: DatasetConfig) -> None:
         )
 
 
-def check_same_profiles(out: Path, dataset: DatasetConfig) -> None:
-    """FsidError unless the profiles of `dataset`, in `out`, say the noise that it began with, if known."""
+def _check_profiles(out: Path, dataset: DatasetConfig) -> None:
     cameras = dataset.generate.cameras
     if dataset.profiles_digest not in ("", profiles_digest(cameras)):
         raise FsidError(

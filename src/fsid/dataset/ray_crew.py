@@ -7,7 +7,6 @@ folder of the process that made the crew, so that relative paths mean the same t
 
 from __future__ import annotations
 
-import hashlib
 import logging
 import os
 import re
@@ -23,6 +22,7 @@ from typing import Any
 import numpy as np
 
 import fsid
+from fsid.assets.bake_cache import content_key
 from fsid.counted import counted
 from fsid.dataset.crew import Lost, MakeWork, Ready, do_task, thread_limits
 from fsid.errors import FsidError
@@ -72,12 +72,8 @@ def _identity() -> str:
     """The versions of FSID and NumPy, and a hash of FSID's files: a checkout changes without its version."""
     package = Path(fsid.__file__).parent
     files = sorted(path for path in package.rglob("*") if path.suffix in _DECIDING)
-    digest = hashlib.sha256()
-    for path in files:
-        digest.update(
-            path.relative_to(package).as_posix().encode() + hashlib.sha256(path.read_bytes()).digest()
-        )
-    return f"fsid {fsid.__version__}, files {digest.hexdigest()[:8]}, NumPy {np.__version__}"
+    key = content_key(bytes(file.relative_to(package)) + b"\0" + file.read_bytes() for file in files)
+    return f"fsid {fsid.__version__}, files {key[:8]}, NumPy {np.__version__}"
 
 
 def _gpu_number(ids: Sequence[Any]) -> int | None:

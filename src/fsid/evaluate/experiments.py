@@ -20,18 +20,19 @@ from itertools import product
 from pathlib import Path
 
 from fsid.config import Override, given_keys, load_settings
+from fsid.counted import counted
 from fsid.dataset import (
     GenerateConfig,
     check_given,
-    check_pictures,
     find_photos,
     find_pictures,
     generate,
 )
-from fsid.dataset.pictures import pictures_digest
+from fsid.dataset.photos import SMALLEST_PX
+from fsid.dataset.pictures import picture_faults, pictures_digest
 from fsid.denoise import TrainConfig, train, train_config
 from fsid.denoise.run_folder import check_same_training
-from fsid.errors import FsidError
+from fsid.errors import FsidError, refuse_any
 from fsid.evaluate.claim import claimed
 from fsid.evaluate.compare import (
     CLASSICAL,
@@ -141,10 +142,14 @@ def _check(out: Path, config: ExperimentConfig, bar: ProgressBar, workers: int) 
         )
     tests = [path for folder in config.tests for path in find_photos(Path(folder))]
     photos = find_pictures(Path(config.photos)) if PHOTOGRAPHS in SOURCES[config.kind] else []
-    if (tests or photos) and not (out / "experiment.yaml").exists():
-        with bar("checking photographs", "pictures") as progress:
-            threads = min(workers, os.cpu_count() or 1)
-            check_pictures([*tests, *photos], threads, progress, dict.fromkeys(photos, least))
+    if (out / "experiment.yaml").exists():
+        return
+    faults, threads = [], min(workers, os.cpu_count() or 1)
+    for name, pictures, smallest_px in (("tests", tests, 0), ("photographs", photos, least)):
+        if pictures:
+            with bar(f"checking {name}", "pictures") as progress:
+                faults += picture_faults(pictures, threads, progress, max(smallest_px, SMALLEST_PX))
+    refuse_any(faults, counted(len(tests) + len(photos), "picture"))
 
 
 def _known(config: ExperimentConfig, workers: int) -> str:

@@ -9,7 +9,16 @@ from pathlib import Path
 
 from fsid.counted import counted
 from fsid.errors import FsidError
-from fsid.evaluate.compare import CLASSICAL, NOISY, Comparison, Method, compare, write_images, write_results
+from fsid.evaluate.compare import (
+    CLASSICAL,
+    NOISY,
+    Comparison,
+    Method,
+    compare,
+    perfect_note,
+    write_images,
+    write_results,
+)
 from fsid.evaluate.testset import TestSet, read_testset
 from fsid.files import make_folder
 from fsid.sensor import read_raw
@@ -59,7 +68,8 @@ def evaluate_models(
     """Compare the baselines and `models` (as `load_model` takes them), with crops of the middle level.
 
     ensemble: of each model, as for `denoise_raw`; where it is not 1 their names say so. note: told in one
-    line of each model at which levels the test set holds more noise than it knows.
+    line of each model at which levels the test set holds more noise than it knows, and which results have no
+    error.
     """
     made = read_testset(testset)
     levels = made.levels
@@ -71,7 +81,10 @@ def evaluate_models(
         methods.append(method)
         if beyond := [level for level, variance in noisiest.items() if variance > method.most_noise]:
             note(f"{method.name}: at {', '.join(beyond)} there is more noise than it knows")
-    return compare(testset, methods, crop_levels=levels[len(levels) // 2 :][:1], progress=progress)
+    comparison = compare(testset, methods, crop_levels=levels[len(levels) // 2 :][:1], progress=progress)
+    if perfect := perfect_note(comparison.images):
+        note(perfect)
+    return comparison
 
 
 def _variance_at(testset: str | Path, made: TestSet, level: str) -> float:

@@ -19,7 +19,7 @@ import numpy as np
 
 from fsid.assets.skies import XYZE, exr_size, size_flaw, sky_sources
 from fsid.counted import counted
-from fsid.errors import FsidError
+from fsid.errors import FsidError, refuse_any
 from fsid.files import read_whole
 from fsid.scene.colour import LUMINANCE
 from fsid.scene.model import Sky
@@ -33,8 +33,6 @@ _THIN_CLOUD, _THICK_CLOUD = np.array([1.6, 1.75, 1.95]), np.array([0.75, 0.85, 1
 _GROUND = 0.25
 _CLOUD_ROWS = 8
 """Rows of clouds drawn at once: as many as stay in the processor's cache."""
-_NAMED = 5
-"""So many unusable panoramas are named."""
 _LEAST_LIGHT = 1e-6
 """Mean of the upper half of a picture, relative to its brightest value, that is no darkness."""
 
@@ -56,12 +54,7 @@ def check_skies(folder: str, progress: Callable[[int, int], None] = lambda done,
         except FsidError as error:
             faults.append(str(error))
         progress(done, len(sources))
-    if faults:
-        more = f" and {len(faults) - _NAMED} more" if len(faults) > _NAMED else ""
-        raise FsidError(
-            f"{len(faults)} of {counted(len(sources), 'panorama')} cannot be used, mend them or move them "
-            f"elsewhere: {'; '.join(faults[:_NAMED])}{more}"
-        )
+    refuse_any(faults, counted(len(sources), "panorama"))
 
 
 @lru_cache(maxsize=2)

@@ -189,6 +189,11 @@ class SceneConfig:
         _check_names("mesh_families", self.mesh_families, mesh_families())
         _check_names("material_families", self.material_families, material_families())
 
+    @property
+    def panoramas(self) -> str:
+        """`hdri_folder`; "" where no scene has a sky."""
+        return self.hdri_folder if self.background.kind_shares[-1] else ""
+
 
 def _check_names(key: str, names: tuple[str, ...], known: tuple[str, ...]) -> None:
     for name in names:
