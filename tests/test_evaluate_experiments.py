@@ -117,6 +117,14 @@ def test_synthetic_against_real_goes_on_where_it_was_stopped(photos: Path, tmp_p
     assert json.loads((out / "results.json").read_text()) == rows
     assert before == {p: p.stat().st_mtime_ns for p in out.rglob("*.tar")}
 
+    for bulky in ("data", "runs"):
+        shutil.rmtree(out / bulky)
+    (out / "report.html").unlink()
+    main(command)  # what is measured needs neither
+    assert "full - photographs" in (out / "report.html").read_text()
+    assert json.loads((out / "results.json").read_text()) == rows
+    assert not (out / "data").exists()
+
     refused(*command, "--count", "3")
     next(held_back.iterdir()).unlink()
     said = refused(*command)

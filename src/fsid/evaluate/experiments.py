@@ -105,19 +105,18 @@ def _run(
         note(f"note: {known}")
     testsets = _testsets(out, config, bar)
     rows, images = _measured(out / "baselines", [NOISY, CLASSICAL], testsets, bar)
-    for source in SOURCES[config.kind]:
-        data = _data(out, config, source, bar, workers)
-        for seed in config.seeds:
-            run = _run_folder(out, source, seed)
-            name = run.name
-            if not (out / "measured" / f"{name}.csv").exists():
-                with bar(f"training {name}", "steps") as progress:
-                    train(data, run, _training(config, seed), progress=progress)
-            trained = model_method(run, name)
-            method = Method(name, f"{_count(config, source)} pairs from {source}", trained.denoise)
-            new_rows, new_images = _measured(out / "measured" / name, [method], testsets, bar)
-            rows += new_rows
-            images += new_images
+    for source, seed in product(SOURCES[config.kind], config.seeds):
+        run = _run_folder(out, source, seed)
+        stem = out / "measured" / run.name
+        method = Method(run.name, f"{_count(config, source)} pairs from {source}", NOISY.denoise)
+        if not _figures(stem).exists():  # else data and network may have been deleted
+            data = _data(out, config, source, bar, workers)
+            with bar(f"training {run.name}", "steps") as progress:
+                train(data, run, _training(config, seed), progress=progress)
+            method = replace(method, denoise=model_method(run, run.name).denoise)
+        new_rows, new_images = _measured(stem, [method], testsets, bar)
+        rows += new_rows
+        images += new_images
     write_results(rows, out / "results.json")
     write_images(images, out / "images.csv")
     pairs = {source: _count(config, source) for source in SOURCES[config.kind]}
@@ -265,8 +264,8 @@ def _check_camera(path: Path, camera: str) -> None:
 def _measured(
     stem: Path, methods: Sequence[Method], testsets: Sequence[Path], bar: ProgressBar
 ) -> tuple[list[Row], list[ImageRow]]:
-    """Figures of methods on all test sets; kept in stem.csv, and read from there the next time."""
-    file = stem.with_suffix(".csv")
+    """Figures of methods on all test sets; kept in a file, and read from there the next time."""
+    file = _figures(stem)
     if not file.exists():
         make_folder(file.parent)
         images: list[ImageRow] = []
@@ -283,6 +282,10 @@ def _measured(
                 raise FsidError(f"{file}: lacks {image.name} at {level}; delete it to measure all again")
         rows += summarise(made, methods, images)
     return rows, images
+
+
+def _figures(stem: Path) -> Path:
+    return stem.with_suffix(".csv")
 
 
 def _read_images(file: Path) -> list[ImageRow]:
