@@ -221,6 +221,22 @@ def test_a_capture_that_a_method_refuses_is_named(small_set: Path, tmp_path: Pat
         compare(tmp_path / "set", [NOISY, CLASSICAL])
 
 
+def test_a_broken_capture_is_named_before_anything_is_measured(small_set: Path, tmp_path: Path):
+    shutil.copytree(small_set, tmp_path / "set")
+    testset = read_testset(small_set)
+    last = testset.noisy(tmp_path / "set", testset.images[-1], testset.levels[-1])
+    last.write_bytes(last.read_bytes()[:1000])
+    measured = []
+
+    def denoise(raw: Raw) -> Raw:
+        measured.append(raw)
+        return raw
+
+    with pytest.raises(FsidError, match=f"^{last}: "):
+        compare(tmp_path / "set", [Method("mine", "", denoise)])
+    assert not measured
+
+
 def test_names_are_text_and_nothing_else(small_set: Path, tmp_path: Path, capsys):
     shutil.copytree(small_set, tmp_path / "set")
     testset = read_testset(small_set)

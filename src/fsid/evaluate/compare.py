@@ -109,7 +109,7 @@ def compare(
 
     crop_levels: levels of which a window of every image is kept; crop_px: its edge in pixels.
     Rows cover each set, and all sets together where there is more than one. FsidError: an unusable test set,
-    or a method whose result is not as `Method` says.
+    of which every file is read before anything is measured, or a method whose result is not as `Method` says.
     """
     root = Path(root)
     testset = read_testset(root)
@@ -124,12 +124,13 @@ def compare(
     images: list[ImageRow] = []
     crops = []
     tasks = list(product(testset.images, testset.levels))
+    progress(0, len(tasks))
+    for image, level in tasks:
+        _read(root, testset, image, level)  # a broken file is named now, not after an hour
     for done, (image, level) in enumerate(tasks):
         progress(done, len(tasks))
-        truth = read_raw(testset.clean(root, image, level))
+        truth, frames, paths = _read(root, testset, image, level)
         developed_truth = develop(truth)
-        paths = [testset.noisy(root, image, level, n) for n in range(testset.frames)]
-        frames = [_noisy(path, truth) for path in paths]
         outputs, shown_psnr = {}, {}
         for method in methods:
             results = [_denoised(method, frame, path) for frame, path in zip(frames, paths, strict=True)]
@@ -163,6 +164,13 @@ def perfect_note(images: Iterable[ImageRow]) -> str:
         f"{counted(len(perfect), 'result')} without error ({first} for one): "
         f"a PSNR counts as {MOST_DB:g} dB at most, and so many lift a mean"
     )
+
+
+def _read(root: Path, testset: TestSet, image: TestImage, level: str) -> tuple[Raw, list[Raw], list[Path]]:
+    """The truth of an image at a level, its captures, and their paths."""
+    truth = read_raw(testset.clean(root, image, level))
+    paths = [testset.noisy(root, image, level, n) for n in range(testset.frames)]
+    return truth, [_noisy(path, truth) for path in paths], paths
 
 
 def _noisy(path: Path, truth: Raw) -> Raw:
