@@ -290,14 +290,14 @@ def test_unreadable_photographs_are_named_before_anything_is_written(photos: Pat
 def test_photographs_too_small_to_train_on_are_named_before_anything_is_written(
     photos: Path, tmp_path: Path, refused
 ):
-    """Smoke trains on patches of 16 packed pixels; a test photograph of that size can be measured on."""
-    for name, size in (("train", (120, 33)), ("test", (32, 32))):
+    """Smoke trains on patches of 24 packed pixels; a test photograph of that size can be measured on."""
+    for name, size in (("train", (120, 49)), ("test", (32, 32))):
         shutil.copytree(photos, tmp_path / name)
         Image.open(min(photos.iterdir())).resize(size).save(tmp_path / name / f"icon-{name}.png")
     command = ["experiment", "real-vs-synthetic", "-o", str(tmp_path / "out"), *SMOKE]
     told = refused(*command, "--photos", tmp_path / "train", "--test", tmp_path / "test")
     assert "1 of 8 pictures cannot be used" in told
-    assert "icon-train.png: is 120x33 pixels, at least 34x34 are needed" in told
+    assert "icon-train.png: is 120x49 pixels, at least 50x50 are needed" in told
     assert not (tmp_path / "out").exists()
 
 

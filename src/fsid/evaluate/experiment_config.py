@@ -87,7 +87,7 @@ def scale_config(kind: Kind, scale: str) -> ExperimentConfig:
             "network.width=8",
             "held_out=0",
             "batch=2",
-            "patch_px=16",
+            "patch_px=24",  # of images of 48 packed pixels: pooled as a whole, not by pieces
             "warmup_steps=2",
             "validate_every=1000",
         )
