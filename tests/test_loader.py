@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import io
 import json
+import multiprocessing
+import os
 import re
 import shutil
+import signal
 import sys
 import tarfile
 import time
@@ -267,6 +270,21 @@ def test_loading_processes_change_nothing(processes: int, dataset: Path) -> None
         assert equal(batch, patches[step])
         places.add(batch.noisy.data_ptr())
     assert not processes or len(places) == 2 * processes + 1
+
+
+def test_signals_to_all_processes_end_no_loading_process_with_an_error(dataset: Path) -> None:
+    """A closed terminal and Ctrl-C: the parent decides. SIGTERM: it ends, and PyTorch says nothing of it."""
+    patches, steps = PatchDataset(dataset, CONFIG, seed=3), range(12)
+    feed = batches(patches, steps, 1)
+    next(feed)
+    (process,) = multiprocessing.active_children()
+    os.kill(process.pid, signal.SIGHUP)
+    os.kill(process.pid, signal.SIGINT)
+    assert len(list(zip(range(10), feed, strict=False))) == 10
+    assert process.is_alive()
+    os.kill(process.pid, signal.SIGTERM)
+    process.join(10)
+    assert process.exitcode == 0
 
 
 def test_too_little_shared_memory_is_one_line(dataset: Path, monkeypatch: pytest.MonkeyPatch) -> None:

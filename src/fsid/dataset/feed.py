@@ -9,6 +9,8 @@ the number of a step.
 
 from __future__ import annotations
 
+import os
+import signal
 from collections.abc import Iterator
 
 from torch.utils.data import DataLoader, Dataset
@@ -32,11 +34,26 @@ def batches(patches: PatchDataset, steps: range, processes: int = 0, *, pin: boo
     else:
         ring = _shared([patches.empty_batch() for _ in range(_AHEAD * processes + 1)])
         slots = DataLoader(
-            _Slots(patches, steps, ring), batch_size=None, num_workers=processes, prefetch_factor=_AHEAD
+            _Slots(patches, steps, ring),
+            batch_size=None,
+            num_workers=processes,
+            prefetch_factor=_AHEAD,
+            worker_init_fn=_leave_signals_to_parent,
         )
         made = (ring[slot] for slot in slots)
     for batch in made:
         yield batch.pin_memory() if pin else batch
+
+
+def _leave_signals_to_parent(worker: int) -> None:
+    """In a worker: Ctrl-C and a closed terminal are for the parent to handle, SIGTERM is no error.
+
+    All three reach every process of a group. PyTorch raises in the parent where a worker dies of one, and
+    waits for ever for one that took over a handler of the parent by which it ignores the SIGTERM to end it.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, lambda number, frame: os._exit(0))
 
 
 class _Slots(Dataset[int]):
