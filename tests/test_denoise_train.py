@@ -132,6 +132,15 @@ def test_training_denoises(data: Path, tmp_path: Path) -> None:
     assert psnrs[-1] > psnrs[0]
 
 
+def test_weights_that_are_no_numbers_are_not_kept(data: Path, tmp_path: Path) -> None:
+    """The last step before a checkpoint or the end, after which no loss shows that it was ruinous."""
+    for steps in (1, 3):
+        ruin = replace(CONFIG, steps=steps, learning_rate=1e39, checkpoint_every=1)
+        with pytest.raises(FsidError, match="the weights are not finite after step 1: the training diverged"):
+            train(data, tmp_path / "run", ruin, quiet=True)
+        assert not list((tmp_path / "run").glob("*.safetensors"))
+
+
 def test_the_history_has_the_last_steps_and_is_never_empty(data: Path, tmp_path: Path) -> None:
     for log_every, rows in ((3, [3, 6, 8]), (100, [8])):
         run = tmp_path / f"every{log_every}"

@@ -21,6 +21,7 @@ from fsid.denoise.model import check_weights, read_tensors, write_tensors
 from fsid.errors import FsidError
 
 CHECKPOINT_FILE = "checkpoint.safetensors"
+DIVERGED = "the training diverged; lower learning_rate and start again"
 _MOMENTS = ("exp_avg", "exp_avg_sq")
 
 
@@ -67,9 +68,11 @@ class TrainState:
 def save_checkpoint(
     run_dir: Path, state: TrainState, net: nn.Module, optimizer: torch.optim.Optimizer
 ) -> None:
-    """Replace `run_dir`'s checkpoint atomically."""
+    """Replace `run_dir`'s checkpoint atomically; FsidError where the weights have become NaN or infinite."""
     tensors = {f"weight.{name}": tensor for name, tensor in net.state_dict().items()}
     tensors |= {f"average.{name}": tensor for name, tensor in state.average.items()}
+    if not all(tensor.isfinite().all() for tensor in tensors.values()):
+        raise FsidError(f"the weights are not finite after step {state.step}: {DIVERGED}")
     for name, parameter in net.named_parameters():
         for moment in _MOMENTS:
             tensors[f"{moment}.{name}"] = optimizer.state[parameter][moment]

@@ -33,7 +33,7 @@ from fsid.dataset.feed import batches
 from fsid.dataset.index import StoredMosaic, identity, index_mosaics
 from fsid.dataset.loader import Batch, PatchConfig, PatchDataset
 from fsid.denoise.board import Board
-from fsid.denoise.checkpoint import TrainState, load_checkpoint, save_checkpoint
+from fsid.denoise.checkpoint import DIVERGED, TrainState, load_checkpoint, save_checkpoint
 from fsid.denoise.denoise import variance_at_grey
 from fsid.denoise.initial import initial_network
 from fsid.denoise.live import LiveLine
@@ -346,5 +346,5 @@ def _step(
     optimizer.step()
     value = loss.item()
     if not np.isfinite(value):
-        raise FsidError("the loss is not finite: the training diverged; lower learning_rate and start again")
+        raise FsidError(f"the loss is not finite: {DIVERGED}")
     return value, mean_psnr(estimate.detach(), clean).item()
