@@ -487,6 +487,18 @@ def test_the_corrected_command_goes_into_the_folder_of_the_one_that_failed(
         train(data, run, wrong, quiet=True)
 
 
+def test_a_run_says_nothing_of_one_that_failed_before_it_had_a_network(data: Path, tmp_path: Path) -> None:
+    """That one's session, on other data, was written before the checkpoint that could not be."""
+    run, other, one = tmp_path / "run", tmp_path / "other", replace(CONFIG, steps=1)
+    other.mkdir()
+    write_shard(shard_path(other, 0), [stored(np.random.default_rng(5), number) for number in range(2)])
+    with pytest.raises(FsidError, match="not finite"):
+        train(other, run, replace(one, learning_rate=1e39), quiet=True)
+    train(data, run, one, quiet=True)
+    train(data, run, one, quiet=True)
+    assert len(json.loads((run / "sessions.json").read_text())) == 1
+
+
 def test_settings_made_in_python_go_on(data: Path, tmp_path: Path) -> None:
     """A list of profiles is read back as a tuple, which is no other training."""
     config = replace(CONFIG, steps=np.int64(1), profiles=["pixel6"])

@@ -9,7 +9,7 @@ from fsid.config import load_settings, read_yaml, save_settings, to_plain
 from fsid.dataset.index import identity
 from fsid.denoise.initial import drop_initial, has_network, keep_initial
 from fsid.denoise.model import Denoiser
-from fsid.denoise.sessions import read_sessions
+from fsid.denoise.sessions import SESSIONS_FILE, read_sessions
 from fsid.denoise.train_config import TrainConfig
 from fsid.errors import FsidError
 from fsid.files import make_folder
@@ -58,6 +58,7 @@ def prepare_run(data_dir: Path, run_dir: Path, config: TrainConfig, initial: Den
         if not is_begun:
             make_folder(run_dir)
             drop_initial(run_dir)  # first: it may be of other settings
+            (run_dir / SESSIONS_FILE).unlink(missing_ok=True)  # of which nothing is in the network to come
         if there != config:
             save_settings(config, file)
         if initial is not None and not is_begun:
