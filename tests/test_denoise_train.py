@@ -286,6 +286,20 @@ def test_what_a_run_holds_out_stays_so_when_its_dataset_grows(
     assert best.details["validation"][0]["psnr_scenes"] == (40.0 if is_older else 50.0)
 
 
+def test_a_run_does_not_go_on_without_what_it_is_validated_on(tmp_path: Path) -> None:
+    """The shard at the end is deleted, as a broken one is; the best network would be replaced by the last."""
+    folder, run, rng = tmp_path / "data", tmp_path / "run", np.random.default_rng(3)
+    folder.mkdir()
+    for shard in range(2):
+        write_shard(shard_path(folder, shard), [stored(rng, 3 * shard + number) for number in range(3)])
+    train(folder, run, replace(CONFIG, steps=1), quiet=True)
+    best = (run / "model.safetensors").read_bytes()
+    shard_path(folder, 1).unlink()
+    with pytest.raises(FsidError, match=r"data: 00000005 is there no more, on which .* its shard back"):
+        train(folder, run, replace(CONFIG, steps=1), quiet=True)
+    assert (run / "model.safetensors").read_bytes() == best
+
+
 def test_a_run_keeps_the_sizes_that_it_was_begun_with(data: Path, tmp_path: Path) -> None:
     run = tmp_path / "run"
     train(data, run, replace(CONFIG, shrink=(2,), steps=2), quiet=True)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from fsid.config import load_settings, read_yaml, save_settings, to_plain
-from fsid.dataset.index import identity
+from fsid.dataset.index import StoredMosaic, identity
 from fsid.denoise.initial import drop_initial, has_network, keep_initial
 from fsid.denoise.model import Denoiser
 from fsid.denoise.sessions import SESSIONS_FILE, read_sessions
@@ -40,8 +41,13 @@ def _begun_with(file: Path) -> TrainConfig:
     return there if "shrink" in read_yaml(file) else replace(there, shrink=(1,))
 
 
-def prepare_run(data_dir: Path, run_dir: Path, config: TrainConfig, initial: Denoiser | None) -> None:
-    """`run_dir` is of `config` and data, whatever a run that failed before its first network left there."""
+def prepare_run(
+    data_dir: Path, run_dir: Path, config: TrainConfig, initial: Denoiser | None, kept: Sequence[StoredMosaic]
+) -> None:
+    """`run_dir` is of `config` and data, whatever a run that failed before its first network left there.
+
+    kept: the images of the data that are held out.
+    """
     file = run_dir / CONFIG_FILE
     there = _begun_with(file) if file.is_file() else None  # FsidError where the file is of something else
     is_begun = there is not None and has_network(run_dir)
@@ -53,7 +59,7 @@ def prepare_run(data_dir: Path, run_dir: Path, config: TrainConfig, initial: Den
         raise FsidError(f"{run_dir}: holds a dataset; give another folder for the run")
     if is_begun:
         check_same_training(run_dir, config)
-        _check_same_data(data_dir, run_dir)
+        _check_same_data(data_dir, run_dir, kept)
     try:
         if not is_begun:
             make_folder(run_dir)
@@ -86,11 +92,16 @@ def check_same_training(run_dir: Path, config: TrainConfig) -> None:
         )
 
 
-def _check_same_data(data_dir: Path, run_dir: Path) -> None:
-    """FsidError where a training has begun in `run_dir` on other data than `data_dir`."""
+def _check_same_data(data_dir: Path, run_dir: Path, kept: Sequence[StoredMosaic]) -> None:
+    """FsidError where a training has begun in `run_dir` on other data than `data_dir`, or holds out more."""
     data = identity(data_dir)
     if any(row.get("data", data) != data for row in read_sessions(run_dir)):
         raise FsidError(
             f"{run_dir}: this run was started on other data than {data_dir}; "
             "continue it with its own dataset or give another folder"
+        )
+    if lost := sorted({*(held_out_as_begun(run_dir) or ())} - {mosaic.key for mosaic in kept}):
+        raise FsidError(
+            f"{data_dir}: {lost[0]} is there no more, on which the run in {run_dir} is validated; "
+            "bring its shard back or give another folder"
         )

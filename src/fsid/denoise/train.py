@@ -118,7 +118,7 @@ def train(
         _note_nothing_held_out(data_dir)
     with held(run_dir, "another fsid train is at work in it") if is_main else nullcontext():
         with accelerator.main_process_first():
-            prepare_run(data_dir, run_dir, config, initial)
+            prepare_run(data_dir, run_dir, config, initial, kept)
         torch.manual_seed(config.seed)
         net, optimizer = _prepare(accelerator, config, initial)
         bare = accelerator.unwrap_model(net)
