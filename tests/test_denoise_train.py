@@ -742,6 +742,31 @@ def test_bad_input_is_named(data: Path, tmp_path: Path) -> None:
         replace(CONFIG, learning_rate=0.0)
 
 
+def test_a_gpu_whose_memory_is_too_small_is_one_line(
+    data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(net: RawDenoiser, *inputs: torch.Tensor) -> torch.Tensor:
+        raise torch.OutOfMemoryError("CUDA out of memory. Tried to allocate 20.00 MiB.")
+
+    monkeypatch.setattr(RawDenoiser, "forward", full)
+    with pytest.raises(FsidError, match="batch 2, patch_px 16: the GPU's memory does not hold"):
+        train(data, tmp_path / "run", CONFIG, quiet=True)
+
+
+def test_a_machine_without_a_compiler_is_one_line(
+    data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As containers with a GPU often are, where the network is compiled unless it is said not to be."""
+
+    def failing(*graph: object) -> Callable[..., object]:
+        raise RuntimeError("Failed to find C compiler. Please specify via CC environment variable.")
+
+    monkeypatch.setattr(torch, "compile", partial(torch.compile, backend=failing))
+    with pytest.raises(FsidError, match=r"compile: .*Failed to find C compiler.*compile=off") as caught:
+        train(data, tmp_path / "run", replace(CONFIG, compile="on"), quiet=True)
+    assert "\n" not in str(caught.value)
+
+
 def test_a_step_follows_the_settings_of_the_optimizer() -> None:
     """Gradients of at most `clip_norm`; AdamW with the betas and the decay that were asked for."""
     config = replace(CONFIG, betas=(0.7, 0.8), weight_decay=0.03, clip_norm=1e-3)

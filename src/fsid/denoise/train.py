@@ -37,6 +37,7 @@ from fsid.denoise.checkpoint import DIVERGED, TrainState, load_checkpoint, save_
 from fsid.denoise.denoise import variance_at_grey
 from fsid.denoise.initial import initial_network
 from fsid.denoise.live import LiveLine
+from fsid.denoise.machine_limits import machine_limits
 from fsid.denoise.model import MODEL_FILE, Denoiser, ModelCard, save_model
 from fsid.denoise.raw_denoiser import RawDenoiser
 from fsid.denoise.run_folder import CONFIG_FILE, held_out_as_begun, prepare_run, sizes_as_begun
@@ -130,7 +131,8 @@ def train(
             keeper = _Keeper(data_dir, run_dir, config, kept, accelerator, card, command, state, live)
             for batch in feed:
                 rate = learning_rate(config, state.step)
-                loss, psnr = _step(accelerator, forward, net, optimizer, batch, rate, config)
+                with machine_limits(config):
+                    loss, psnr = _step(accelerator, forward, net, optimizer, batch, rate, config)
                 state.advance(bare, config.ema_decay)
                 live.update(state.step, loss, psnr)
                 is_due = state.step % config.log_every == 0 or state.step == config.steps

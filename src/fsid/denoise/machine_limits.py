@@ -1,0 +1,33 @@
+"""What a machine cannot do for a training, as one line that names the setting."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import torch
+
+from fsid.denoise.train_config import TrainConfig
+from fsid.errors import FsidError
+
+
+@contextmanager
+def machine_limits(config: TrainConfig) -> Iterator[None]:
+    """FsidError where a GPU's memory does not hold a step, or where torch.compile finds no compiler."""
+    try:
+        yield
+    except torch.OutOfMemoryError:
+        raise FsidError(
+            f"batch {config.batch}, patch_px {config.patch_px}: the GPU's memory does not hold them; "
+            "lower one of the two"
+        ) from None
+    except RuntimeError as error:
+        from torch._dynamo.exc import BackendCompilerFailed  # here, since its import takes a second
+
+        if not isinstance(error, BackendCompilerFailed):
+            raise
+        reason = " ".join(str(error).partition("\n\n")[0].split())
+        raise FsidError(
+            f"compile: torch.compile fails here ({reason}); install the C++ compiler that it needs, "
+            "or set compile=off, which is slower"
+        ) from None
