@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import json
+import os
 import shutil
 import signal
 import subprocess
@@ -477,10 +479,20 @@ def test_a_run_that_goes_on_keeps_the_figures_up_to_its_checkpoint_in_tensorboar
     assert [(event.step, event.value) for event in events.Scalars("train/loss")] == [(2, 2), (4, 4), (6, 10)]
 
 
-def test_logs_that_cannot_be_written_are_one_line(tmp_path: Path) -> None:
+def test_logs_that_cannot_be_written_are_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the place of a file, and where the disk is full by then."""
     pytest.importorskip("tensorboard")
+
+    def full(*point: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    line = r"tensorboard: cannot be written .*tensorboard=false does without"
+    board = Board(tmp_path / "full", 0, wanted=True)
+    monkeypatch.setattr("torch.utils.tensorboard.SummaryWriter.add_scalar", full)
+    with pytest.raises(FsidError, match=line):
+        board.write(1, {"train/loss": 1.0})
     (tmp_path / "tensorboard").touch()
-    with pytest.raises(FsidError, match=r"tensorboard: cannot be written .*tensorboard=false does without"):
+    with pytest.raises(FsidError, match=line):
         Board(tmp_path, 0, wanted=True)
 
 
