@@ -447,6 +447,14 @@ def test_an_accelerator_of_one_s_own_may_have_another_precision(
     assert (before or make()).mixed_precision == "bf16"
 
 
+def test_a_compiler_that_accelerate_is_configured_with_changes_nothing(
+    data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`accelerate launch` says so to its processes; the names of a compiled network's weights are others."""
+    monkeypatch.setenv("ACCELERATE_DYNAMO_BACKEND", "EAGER")
+    load_denoiser(train(data, tmp_path / "run", replace(CONFIG, steps=1), quiet=True))
+
+
 def test_a_folder_is_one_training_s_at_a_time(data: Path, tmp_path: Path) -> None:
     run, one = tmp_path / "run", replace(CONFIG, steps=1)
     with (

@@ -102,7 +102,7 @@ def train(
     if config.threads:
         torch.set_num_threads(config.threads)
     gpu = torch.cuda.is_available()
-    accelerator = Accelerator(cpu=not gpu, mixed_precision="bf16" if gpu else "no")
+    accelerator = Accelerator(cpu=not gpu, mixed_precision="bf16" if gpu else "no", dynamo_backend="no")
     is_main = accelerator.is_main_process
     kept = held_out(data_dir, config, held_out_as_begun(run_dir))
     scenes = {mosaic.scene for mosaic in kept}
