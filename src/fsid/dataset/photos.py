@@ -2,27 +2,30 @@
 
 from __future__ import annotations
 
-import io
 import os
 import struct
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import numpy as np
-from PIL import ExifTags, Image, ImageCms
+from PIL import ExifTags, Image
 
+from fsid.dataset.photo_values import srgb_values
 from fsid.errors import FsidError
 from fsid.files import check_file
 from fsid.sensor import upright
 
 SMALLEST_PX = 32
 _BLACK = 0.02  # sRGB-encoded; a photograph that is darker everywhere shows nothing
-_WITHOUT_ALPHA = {"P": "RGB", "PA": "RGB", "RGBA": "RGB", "RGBX": "RGB", "LA": "L", "1": "L"}
 PHOTO_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".bmp")
 _FORMATS = ("PNG", "JPEG", "TIFF", "WEBP", "BMP")
 """Whatever a file is called: others Pillow may hand to programs of their own, PostScript to Ghostscript."""
-_SUBFILE, _PHOTOMETRIC, _SUB_PAGES = 254, 262, 330
-_REDUCED, _WHITE_IS_ZERO = (1, 3, 5, 7), 0
-"""Tags of TIFF 6.0, and what the first two may say."""
+_SUBFILE, _SUB_PAGES = 254, 330
+_REDUCED = (1, 3, 5, 7)
+"""Tags of TIFF 6.0, and what the first may say."""
 
 
 def find_photos(folder: str | Path) -> list[Path]:
@@ -56,7 +59,8 @@ def deeper(folder: Path, suffixes: tuple[str, ...]) -> str:
 def read_photo(path: str | Path) -> np.ndarray:
     """(H, W, 3) float32 sRGB-encoded 0..1, upright, cropped to even size; FsidError where unreadable.
 
-    Colours of another space, which an ICC profile in the file states, are brought to sRGB and clipped there.
+    Colours of another space that the file states (an ICC profile, the gamma of a PNG, Adobe RGB in EXIF) are
+    brought to sRGB and clipped there.
     """
     pixels = _read(path)
     height, width = (size // 2 * 2 for size in pixels.shape[:2])
@@ -85,7 +89,7 @@ def _read(path: str | Path, shrink: int = 1, least_px: int = 1, smallest_px: int
     """As `read_photo`; a JPEG `shrink` times smaller, or of `least_px`, which its decoder does quickly."""
     check_file(Path(path))
     try:
-        with Image.open(path, formats=_FORMATS) as image:
+        with _without_warnings(), _opened(path) as image:
             _pass_thumbnails(image)
             width, height = image.size
             if min(width, height) < smallest_px:
@@ -93,9 +97,27 @@ def _read(path: str | Path, shrink: int = 1, least_px: int = 1, smallest_px: int
                 raise FsidError(f"{path}: is {width}x{height} pixels, {needed}")
             if shrink > 1:
                 image.draft(image.mode, (max(width // shrink, least_px), max(height // shrink, least_px)))
-            return _decoded(image)
-    except (OSError, SyntaxError, ValueError, struct.error, Image.DecompressionBombError) as error:
+            values = srgb_values(image, partial(_opened, path, image.tell()))
+            # not Pillow's exif_transpose: it writes all of EXIF anew, and a faulty tag makes that fail
+            return upright(values, image.getexif().get(ExifTags.Base.Orientation, 1))
+    except Image.DecompressionBombError:
+        raise FsidError(f"{path}: has more than 178 million pixels; make it smaller") from None
+    except (OSError, SyntaxError, ValueError, struct.error) as error:
         raise FsidError(f"{path}: cannot be read as a photograph ({error})") from None
+
+
+@contextmanager
+def _without_warnings() -> Iterator[None]:
+    """Pillow's own, of what it copes with: faulty EXIF, transparency, 108 million pixels of a phone."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", module=r"PIL\.")
+        yield
+
+
+def _opened(path: str | Path, page: int = 0) -> Image.Image:
+    image = Image.open(path, formats=_FORMATS)
+    image.seek(page)
+    return image
 
 
 def _pass_thumbnails(image: Image.Image) -> None:
@@ -108,36 +130,3 @@ def _pass_thumbnails(image: Image.Image) -> None:
         except EOFError:
             raise ValueError("its pages are thumbnails alone; save the picture as the first page") from None
         tags = getattr(image, "tag_v2", {})
-
-
-def _decoded(image: Image.Image) -> np.ndarray:
-    """(H, W, 3) float32 0..1, upright."""
-    # not Pillow's exif_transpose: it writes all of EXIF anew, and a faulty tag makes that fail
-    return upright(_values(image), image.getexif().get(ExifTags.Base.Orientation, 1))
-
-
-def _values(image: Image.Image) -> np.ndarray:
-    """(H, W, 3) float32 0..1, as stored; Pillow's own conversion of 16-bit grey would clip it to white."""
-    if image.mode.startswith("I;16") or (image.mode, image.format) == ("I", "PNG"):
-        grey = np.asarray(image, np.float32) / np.float32(65535.0)
-        if getattr(image, "tag_v2", {}).get(_PHOTOMETRIC) == _WHITE_IS_ZERO:  # of 8 bits Pillow sees to it
-            grey = 1 - grey
-        return grey[..., None].repeat(3, axis=2)
-    if image.mode in ("I", "F"):
-        raise ValueError("its values are not 8-bit or 16-bit unsigned integers")
-    return np.asarray(_in_srgb(image), np.float32) / np.float32(255.0)
-
-
-def _in_srgb(image: Image.Image) -> Image.Image:
-    """RGB, from the colour space of the ICC profile that the image holds; sRGB where none fits."""
-    kind = _WITHOUT_ALPHA.get(image.mode, image.mode)
-    bare = image if kind == image.mode else image.convert(kind)
-    try:
-        profile = ImageCms.ImageCmsProfile(io.BytesIO(image.info["icc_profile"]))
-        if not ImageCms.getProfileDescription(profile).startswith("sRGB"):
-            srgb = ImageCms.createProfile("sRGB")
-            found = ImageCms.profileToProfile(bare, profile, srgb, outputMode="RGB")
-            return bare.convert("RGB") if found is None else found
-    except (KeyError, OSError, ImageCms.PyCMSError):  # none, broken, or of another kind of image
-        pass
-    return bare.convert("RGB")
