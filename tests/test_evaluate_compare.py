@@ -108,8 +108,9 @@ def test_the_truth_scores_perfectly(small_set: Path):
     assert row.ssim == pytest.approx(1.0)
 
 
-def test_a_picture_without_noise_leaves_its_set_a_mean(photos: Path, tmp_path: Path, capsys):
+def test_a_picture_without_noise_leaves_its_set_a_mean(photos: Path, tmp_path: Path, capsys, monkeypatch):
     """Black at a low ISO is stored as it is: its PSNR was infinite, and the mean of the set null."""
+    monkeypatch.setattr("fsid.evaluate.testset.check_pictures", lambda *_: None)
     shutil.copytree(photos, tmp_path / "photos")
     Image.new("RGB", (64, 64)).save(tmp_path / "photos" / "black.png")
     photo_testset([tmp_path / "photos"], tmp_path / "set", camera="pixel6", isos=[50])
@@ -411,6 +412,22 @@ def test_a_broken_photograph_leaves_no_test_set(photos: Path, tmp_path: Path):
     with pytest.raises(FsidError, match=r"zzz\.png"):
         photo_testset([tmp_path / "photos"], tmp_path / "out", camera="pixel6", isos=[800])
     assert sorted(path.name for path in tmp_path.iterdir()) == ["photos"]
+
+
+def test_all_photographs_that_are_of_no_use_are_named_before_the_first_is_captured(
+    photos: Path, tmp_path: Path, refused, monkeypatch
+):
+    """One after the other, the last of a thousand would cost an hour; and what is black measures nothing."""
+    monkeypatch.setattr("fsid.evaluate.testset.read_photo", lambda path: pytest.fail("captured before"))
+    shutil.copytree(photos, tmp_path / "photos")
+    Image.new("RGB", (64, 64)).save(tmp_path / "photos" / "zy.png")
+    (tmp_path / "photos" / "zz.png").write_bytes(b"\x89PNG\r\n\x1a\n but not really")
+    command = ("testset", "photos", tmp_path / "photos", "-o", tmp_path / "out", "--quiet")
+    said = refused(*command)
+    assert said.startswith("fsid: 2 of 5 pictures cannot be used")
+    assert "zy.png: is black all over; " in said
+    assert "zz.png: cannot be read as a photograph" in said
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_set_has_the_name_of_its_folder(photos: Path, tmp_path: Path, monkeypatch):

@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fsid.config import from_plain, read_json, to_plain
-from fsid.dataset import find_photos, read_photo
+from fsid.dataset import check_pictures, find_photos, read_photo
 from fsid.dataset.pictures import pictures_digest
 from fsid.errors import FsidError
 from fsid.files import held, paths_of, write_atomically
@@ -47,6 +47,8 @@ TESTSET_FILE = "testset.json"
 _STEM = 60
 """Letters of a photograph's name in that of its folder: a file system takes 255 bytes."""
 _MOST_FRAMES = 10_000
+_CHECKED_AT_ONCE = 8
+"""Photographs, each of which takes some hundred megabytes."""
 ALL_SETS = "all"
 """The name in results of all sets together."""
 
@@ -143,7 +145,8 @@ def photo_testset(
     where a phone brightens digitally.
 
     The set of an image is the name of its folder. Photograph i draws from SeedSequence(seed, spawn_key=(i,)).
-    FsidError for a camera, levels, folders or photographs that cannot be used, or an `out` that is not empty.
+    FsidError for a camera, levels or folders that cannot be used, an `out` that is not empty, and for all
+    photographs that cannot be read or show nothing, before the first of them takes its time.
     """
     profile = load_bayer_profile(camera)
     levels = levels_of(profile, isos, luxes)
@@ -154,6 +157,7 @@ def photo_testset(
     photos = [
         (name, path) for name, folder in zip(names, sources, strict=True) for path in find_photos(folder)
     ]
+    paths = [path for _, path in photos]
     testset = TestSet(
         camera=profile.name,
         levels=tuple(levels),
@@ -163,14 +167,17 @@ def photo_testset(
         ),
         seed=seed,
         notes="photographs unprocessed to RAW (Brooks et al. 2019), noise from the camera's profile",
-        pictures_digest=pictures_digest([path for _, path in photos]),
+        pictures_digest=pictures_digest(paths),
         profiles_digest=profiles_digest([camera]),
     )
 
     def truth(rng: np.random.Generator, i: int) -> Raw:
-        return clean_from_photo(rng, read_photo(photos[i][1]), profile)
+        return clean_from_photo(rng, read_photo(paths[i]), profile)
 
-    capture(testset, Path(out), profile, levels, truth, progress)
+    def check() -> None:
+        check_pictures(paths, min(os.cpu_count() or 1, _CHECKED_AT_ONCE))
+
+    capture(testset, Path(out), profile, levels, truth, progress, check)
     return testset
 
 
@@ -215,12 +222,14 @@ def capture(
     levels: dict[str, Setting],
     truth: Callable[[np.random.Generator, int], Raw],
     progress: Progress,
+    check: Callable[[], None] = lambda: None,
 ) -> None:
     """Write a test set: truth(rng, i) of image i, and `testset.frames` captures of it at every level.
 
-    Image i draws from SeedSequence(testset.seed, spawn_key=(i,)).
+    Image i draws from SeedSequence(testset.seed, spawn_key=(i,)). check: comes first, once `out` is free.
     """
     with staged(out) as root:
+        check()
         for i, image in enumerate(testset.images):
             rng = np.random.default_rng(np.random.SeedSequence(testset.seed, spawn_key=(i,)))
             clean = truth(rng, i)
