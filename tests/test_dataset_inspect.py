@@ -13,6 +13,7 @@ from skimage.color import lab2rgb
 from fsid.cli.main import main
 from fsid.dataset import find_photos, find_pictures
 from fsid.dataset.inspect import _picture, inspect
+from fsid.dataset.inspect_plot import inspection_picture
 from fsid.dataset.shards import shard_path, write_shard
 from fsid.dataset.statistics import TITLES, compare, distance, measure, pool, spectrum_slope
 from fsid.errors import FsidError
@@ -170,6 +171,20 @@ def test_photographs_and_the_dataset_made_from_them_are_seen_alike(photos, tmp_p
     colour = by_name["colour_texture"]
     assert colour["mean"] == pytest.approx(colour["reference_mean"], abs=0.02), "one skipped the camera"
     assert (tmp_path / "out" / "statistics.png").stat().st_size > 10_000
+
+
+def test_every_picture_is_in_every_histogram_and_no_axes_are_empty(photos, monkeypatch):
+    """The one of the most near-black pixels was beyond the axis."""
+    drawn = []
+    monkeypatch.setattr(
+        "fsid.dataset.inspect_plot.Figure.savefig", lambda figure, *_, **__: drawn.append(figure)
+    )
+    inspection_picture(inspect(photos, photos))
+    (figure,) = drawn
+    assert len(figure.axes) == len(TITLES)
+    for axes in figure.axes:
+        bars = [bar.get_height() for bar in axes.patches]
+        assert sum(bars) == pytest.approx(200), axes.get_title()
 
 
 def test_a_folder_that_refuses_files_is_said_before_the_work(photos, tmp_path, refused, monkeypatch):

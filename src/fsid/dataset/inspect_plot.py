@@ -17,11 +17,14 @@ _BINS = 40
 
 
 def inspection_picture(inspection: Inspection) -> bytes:
-    """The histograms as a PNG file."""
+    """The histograms as a PNG file; their outermost bars hold what lies beyond, too."""
     distances = {c.name: c for c in inspection.comparisons}
     rows = -(-len(TITLES) // _COLUMNS)
     figure = Figure(figsize=(4.2 * _COLUMNS, 2.8 * rows), layout="constrained")
-    for axes, (name, title) in zip(figure.subplots(rows, _COLUMNS).flat, TITLES.items(), strict=False):
+    places = list(figure.subplots(rows, _COLUMNS).flat)
+    for axes in places[len(TITLES) :]:
+        axes.remove()
+    for axes, (name, title) in zip(places, TITLES.items(), strict=False):
         sets = {as_label(_name(inspection.data)): inspection.values[name]}
         if inspection.reference is not None:
             sets[as_label(f"{_name(inspection.reference_name)} (reference)")] = inspection.reference[name]
@@ -30,7 +33,7 @@ def inspection_picture(inspection: Inspection) -> bytes:
         edges = np.linspace(low, high if high > low else low + 1.0, _BINS + 1)
         for label, values in sets.items():
             weights = np.full(len(values), 100 / len(values))
-            axes.hist(values, edges, weights=weights, label=label, alpha=0.55)
+            axes.hist(values.clip(low, high), edges, weights=weights, label=label, alpha=0.55)
         distance = f"\ndistance {distances[name].distance:.2f}" if name in distances else ""
         axes.set_title(title + distance, fontsize=9)
         axes.set_ylabel("%", fontsize=8)
