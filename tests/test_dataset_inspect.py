@@ -317,6 +317,13 @@ def test_colours_are_counted_on_both_axes_of_their_plane():
     assert found["colour_entropy"].max() == 0
 
 
+def test_grey_with_a_trace_of_colour_has_no_entropy():
+    """Cells that meet at grey made it the most colourful of all: 2 bits."""
+    lab = np.full((32, 32, 3), (56.0, 0.0, 0.0))
+    lab[..., 1:] += np.random.default_rng(0).uniform(-2, 2, (32, 32, 2))
+    assert measure(lab2rgb(lab))["colour_entropy"].max() == 0
+
+
 def test_greens_and_blues_are_told_apart_in_the_entropy():
     """Two colours of negative a*, two of negative b*, half a patch of each: one bit."""
     for pair in ([(80.0, -30.0, 40.0), (80.0, -55.0, 40.0)], [(40.0, 20.0, -30.0), (40.0, 20.0, -55.0)]):

@@ -167,7 +167,8 @@ def _colours(image: np.ndarray) -> dict[str, np.ndarray]:
     lab = rgb2lab(np.clip(image, 0, 1))
     cells = np.floor(lab[..., 1:] / AB_CELL).astype(int) + 32
     counts = np.bincount((cells[..., 0] * 64 + cells[..., 1]).ravel(), minlength=4096)
-    code = (np.clip(lab / (12.5, 25.0, 25.0) + (0, 5, 5), 0, 15).astype(int) * (256, 16, 1)).sum(-1)
+    # grey lies in the middle of a cell: at a corner, hardly any colour would be the 2 bits of four cells
+    code = (np.clip(lab / (12.5, 25.0, 25.0) + (0, 5.5, 5.5), 0, 15).astype(int) * (256, 16, 1)).sum(-1)
     entropy = [_entropy(patch) for patch in _blocks(code, PATCH_PX).reshape(-1, PATCH_PX**2)]
     red_green = image[..., 0] - image[..., 1]
     yellow_blue = (image[..., 0] + image[..., 1]) / 2 - image[..., 2]
