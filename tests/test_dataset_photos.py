@@ -140,6 +140,14 @@ def test_adobe_rgb_of_a_camera_that_embeds_no_profile_is_brought_to_srgb(tmp_pat
     np.testing.assert_allclose(read_photo(tmp_path / "_IMG.jpg")[0, 0], expected, atol=1e-3)
 
 
+def test_tiles_of_a_width_that_cannot_be_are_one_line(tmp_path: Path) -> None:
+    tifffile.imwrite(tmp_path / "a.tif", COLOURS, photometric="rgb", tile=(16, 16))
+    with tifffile.TiffFile(tmp_path / "a.tif", mode="r+b") as file:
+        file.pages[0].tags["TileWidth"].overwrite(1 << 30)
+    with pytest.raises(FsidError, match=r"a\.tif: cannot be read as a photograph"):
+        read_photo(tmp_path / "a.tif")
+
+
 def test_the_pixels_of_a_phone_are_no_attack(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Pillow warns of half as many as it refuses; a warning is an error in these tests."""
     file = io.BytesIO()

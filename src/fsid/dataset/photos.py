@@ -102,7 +102,7 @@ def _read(path: str | Path, shrink: int = 1, least_px: int = 1, smallest_px: int
             return upright(values, image.getexif().get(ExifTags.Base.Orientation, 1))
     except Image.DecompressionBombError:
         raise FsidError(f"{path}: has more than 178 million pixels; make it smaller") from None
-    except (OSError, SyntaxError, ValueError, struct.error) as error:
+    except (OSError, SyntaxError, ValueError, OverflowError, struct.error) as error:
         raise FsidError(f"{path}: cannot be read as a photograph ({error})") from None
 
 
