@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import gc
 import hashlib
 import os
 import pickle
@@ -341,6 +342,16 @@ def test_a_renderer_is_not_sent_to_another_process(renderer: Renderer) -> None:
         pickle.dumps(renderer)
 
 
+def test_a_renderer_that_nobody_refers_to_makes_room_for_another() -> None:
+    """As after a cell of a notebook, of which nothing is left that could be closed."""
+    gc.disable()
+    try:
+        frames = [Renderer(texture_size=64).radiance(scene(1)) for _ in range(2)]
+    finally:
+        gc.enable()
+    assert np.array_equal(*frames)
+
+
 def test_a_closed_renderer_says_so(renderer: Renderer) -> None:
     renderer.close()
     with pytest.raises(FsidError, match="closed"):
@@ -357,7 +368,7 @@ def test_missing_drivers_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
     ) as error:
         Renderer()
     assert "\n" not in str(error.value)
-    assert Renderer._active is None
+    assert not Renderer._is_open
 
 
 def test_an_unknown_device_is_an_error() -> None:

@@ -48,22 +48,27 @@ def open_context(device_index: int | None) -> moderngl.Context:
     """
     if device_index is not None:
         return _create(device_index)
-    first_error: FsidError | None = None
+    fault = ""  # not the error, whose traceback would hold the caller's frames
     software: int | None = None
     for index in range(_MAX_DEVICES):
         try:
             context = _create(index)
         except FsidError as error:
-            first_error = first_error or error
+            fault = fault or str(error)
             continue
         if not gl_info(context).is_software:
             return context
         context.release()
         software = index if software is None else software
     if software is None:
-        assert first_error is not None
-        raise first_error
+        raise FsidError(fault)
     return _create(software)
+
+
+def release_context(context: moderngl.Context) -> None:
+    """Give a context and its memory back; a child by fork leaves alone what is its parent's."""
+    if _used_in == os.getpid():
+        context.release()
 
 
 def egl_devices() -> dict[int, GlInfo]:

@@ -12,6 +12,7 @@ what is resident (texture slots) are addressed by whole numbers, and everything 
 from __future__ import annotations
 
 import threading
+import weakref
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from types import TracebackType
@@ -30,6 +31,7 @@ from fsid.render.context import (
     gl_info,
     keep_blocks,
     open_context,
+    release_context,
     return_free_blocks,
     return_large_blocks,
 )
@@ -63,7 +65,8 @@ Mark = Callable[[str], None]
 
 
 class Renderer:
-    """Owns the process's one OpenGL context and what is resident on it. Use it in a `with` block.
+    """Owns the process's one OpenGL context and what is resident on it. Use it in a `with` block or close
+    it; one that nothing refers to any more, as in a notebook, closes by itself.
 
     device_index: EGL device; None takes the first GPU, or else the CPU. supersampling: edge of the square
     grid of samples per pixel, 1..4. texture_size: texels per side of a material tile, a power of two; fewer
@@ -77,7 +80,7 @@ class Renderer:
     their own; one that was forked from a process that had a Renderer cannot (a spawned one can): FsidError.
     """
 
-    _active: ClassVar[Renderer | None] = None
+    _is_open: ClassVar[bool] = False
 
     def __init__(
         self,
@@ -90,7 +93,7 @@ class Renderer:
         compute: bool | None = None,
     ) -> None:
         check_not_forked()
-        if Renderer._active is not None:
+        if Renderer._is_open:
             raise FsidError(
                 "a Renderer is already open in this process: close it first, or use another process"
             )
@@ -107,7 +110,9 @@ class Renderer:
         self._grid = supersampling
         self._context = open_context(device_index)
         self._thread = threading.get_ident()
-        Renderer._active = self
+        Renderer._is_open = True
+        self._given_back = weakref.finalize(self, _give_back, self._context)
+        self._given_back.atexit = False
         try:
             self._on_gpu = not self.info.is_software
             (keep_blocks if self._on_gpu else return_large_blocks)()
@@ -148,9 +153,7 @@ class Renderer:
 
     def close(self) -> None:
         """Give the context and its memory back; the renderer cannot be used afterwards."""
-        if Renderer._active is self:
-            self._context.release()
-            Renderer._active = None
+        self._given_back()
 
     def __reduce__(self) -> NoReturn:
         raise TypeError("a Renderer cannot be copied or sent to another process: open one there")
@@ -203,7 +206,7 @@ class Renderer:
         bake: where the texels of materials come from; None takes `bake_texels`. shift_px: moves the image by
         a part of a pixel (right, down). labels: False may leave albedo, normal and object_id without pixels.
         """
-        if Renderer._active is not self:
+        if not self._given_back.alive:
             raise FsidError("this Renderer is closed")
         check_not_forked()
         if threading.get_ident() != self._thread:
@@ -333,6 +336,11 @@ class Renderer:
             self._shade.draw_glass(targets, stage, buffers, shot, self._layers)
         if not self._on_gpu:
             self._context.finish()
+
+
+def _give_back(context: moderngl.Context) -> None:
+    release_context(context)
+    Renderer._is_open = False
 
 
 def _focal_px(camera: Camera) -> float | np.ndarray:
