@@ -7,13 +7,29 @@ line and exits with code 2; any other exception is a bug in FSID and keeps its t
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Sequence
+from typing import Any
 
 _NAMED = 5
 
 
 class FsidError(Exception):
     """Bad input. The message is one complete line for the user: what is wrong, where, what to do."""
+
+
+def whole(value: Any, name: str) -> int:
+    """A whole number as Python's, also one of NumPy's; FsidError, naming it, for 960.0, a text or None."""
+    try:
+        return operator.index(value)
+    except TypeError:
+        raise FsidError(f"{name}: {value!r:.60} is not a whole number") from None
+
+
+def check_kind(value: object, kind: type, advice: str) -> None:
+    """FsidError unless `value` is a `kind`. advice: how to get one."""
+    if not isinstance(value, kind):
+        raise FsidError(f"a {type(value).__name__} is no {kind.__name__}: {advice}")
 
 
 def refuse_any(faults: Sequence[str], of: str) -> None:

@@ -146,7 +146,7 @@ class Attempt:
         config, rng = self.config, self._rng(_TASK)
         if not config.images:
             if renderer is None:
-                raise ValueError("a renderer is needed to make samples from scenes")
+                raise FsidError("a renderer is needed to make samples from scenes: that of rendering(config)")
             scene = self.drawn_scene()
             facts = {"split": split_of(config, self.frame), "scene": to_plain(scene)}
             views, shutter_s = views_of_scene(rng, config, scene, renderer), scene.cameras[0].exposure_s

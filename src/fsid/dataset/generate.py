@@ -8,7 +8,6 @@ goes on where it stopped, and one that is running keeps others out of its folder
 from __future__ import annotations
 
 import itertools
-import operator
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -34,7 +33,7 @@ from fsid.dataset.settle import Settle, settle
 from fsid.dataset.shards import count_whole, each_sample, remove_parts, shard_path, write_shard
 from fsid.dataset.tasks import SceneRenderer, check_cameras, check_task
 from fsid.dataset.worker import Worker
-from fsid.errors import FsidError
+from fsid.errors import FsidError, check_kind, whole
 from fsid.files import held
 from fsid.sensor import CameraProfile, load_bayer_profile
 from fsid.sensor.profiles import profiles_digest
@@ -131,9 +130,10 @@ def generate(
     Raises FsidError where `out` already holds a dataset of another configuration or seed, where another
     process fills it, where the disk refuses, or where a shard kills its worker again and again.
     """
+    count = whole(count, "count")
     if count < 1:
         raise FsidError(f"--count {count}: must be at least 1")
-    out, count, workforce = Path(out), operator.index(count), workforce or Workforce(workers)
+    out, workforce = Path(out), workforce or Workforce(workers)
     dataset = dataset_config(config, seed, shard_size)
     with _locked(out):
         begun, todo = _check_own(out, dataset), list(_missing(out, dataset, count))
@@ -161,11 +161,12 @@ def generate(
     return total
 
 
-def pairs_to_make(out: Path, dataset: DatasetConfig, count: int) -> tuple[int, int]:
+def pairs_to_make(out: str | Path, dataset: DatasetConfig, count: int) -> tuple[int, int]:
     """How many of the first `count` pairs `out` lacks, in whole frames, and in how many shards they are.
 
     FsidError where it holds others.
     """
+    out = Path(out)
     _check_own(out, dataset)
     missing = list(_missing(out, dataset, count))
     if missing:
@@ -197,6 +198,7 @@ def dataset_config(config: GenerateConfig, seed: int, shard_size: int = 0) -> Da
 
 def check_settings(config: GenerateConfig) -> None:
     """FsidError where what `config` names does not exist, or its parts do not agree; reads no large file."""
+    check_kind(config, GenerateConfig, "generate_config makes one of a file, a name or settings")
     for camera in config.cameras:
         _check_noise(load_bayer_profile(camera), config.iso_range[1])
     check_cameras(config)
@@ -248,11 +250,12 @@ def _check_own(out: Path, dataset: DatasetConfig) -> bool:
     return is_begun(out, dataset)
 
 
-def is_begun(out: Path, dataset: DatasetConfig) -> bool:
+def is_begun(out: str | Path, dataset: DatasetConfig) -> bool:
     """Whether the config.yaml of `out` is that of `dataset`; FsidError where `out` has samples of another.
 
     Without samples there is no other, whatever a run that failed before its first shard left there.
     """
+    out = Path(out)
     file = out / "config.yaml"
     if not file.exists():
         return False

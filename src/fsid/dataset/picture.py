@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from PIL import Image
 from fsid.dataset.config import GenerateConfig
 from fsid.dataset.sample import make_sample, to_uint8
 from fsid.dataset.worker import rendering
-from fsid.errors import FsidError
+from fsid.errors import FsidError, whole
 from fsid.files import check_output, write_atomically
 from fsid.sensor import develop
 
@@ -25,17 +25,17 @@ def save_png(path: str | Path, srgb: np.ndarray) -> None:
 
     FsidError where it cannot be written, is of another shape, or is none that `to_uint8` takes.
     """
-    path = Path(path)
     check_png(path)
     if srgb.ndim != 3 or srgb.shape[2] != 3 or not srgb.size:
         raise FsidError(f"{path}: a picture must have shape (height, width, 3); got {srgb.shape}")
     buffer = io.BytesIO()
     Image.fromarray(to_uint8(srgb)).save(buffer, "PNG")
-    write_atomically(path, buffer.getvalue())
+    write_atomically(Path(path), buffer.getvalue())
 
 
-def check_png(path: Path) -> None:
+def check_png(path: str | Path) -> None:
     """FsidError unless `path` names a PNG file that can be written."""
+    path = Path(path)
     if path.suffix.lower() != ".png":
         raise FsidError(f"{path}: pictures are written as .png")
     check_output(path)
@@ -54,6 +54,7 @@ def contact_sheet(
     texture behind a mosaic is full of false colour, which looks like noise. FsidError for a count below 1,
     and as `make_sample`.
     """
+    count = whole(count, "count")
     if count < 1:
         raise FsidError(f"--count {count}: at least one scene is needed")
     config = replace(config, crops=1, crop_width=0, crop_height=0, exposures=1, noise_levels=1)
@@ -72,11 +73,12 @@ def _half(image: np.ndarray) -> np.ndarray:
     return np.asarray(image.reshape(len(image) // 2, 2, -1, 2, image.shape[2]).mean((1, 3)))
 
 
-def grid(tiles: list[np.ndarray]) -> np.ndarray:
+def grid(tiles: Iterable[np.ndarray]) -> np.ndarray:
     """(h, w, 3) tiles side by side, about as many columns as rows, on white, uint8; room for the largest.
 
     FsidError where there is none, or one that `to_uint8` does not take.
     """
+    tiles = list(tiles)
     if not tiles:
         raise FsidError("a grid of pictures needs at least one")
     columns = int(np.ceil(np.sqrt(len(tiles))))

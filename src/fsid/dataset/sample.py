@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import io
 import json
-import operator
 import zlib
 from typing import Any
 
@@ -21,7 +20,7 @@ from fsid.config import from_plain
 from fsid.dataset.attempt import Attempt, Sample, sample_key
 from fsid.dataset.config import GenerateConfig
 from fsid.dataset.tasks import SceneRenderer
-from fsid.errors import FsidError
+from fsid.errors import FsidError, check_kind, whole
 from fsid.scene import Scene, scene_from_json
 from fsid.sensor import Raw, clean_levels, develop, write_dng
 
@@ -46,7 +45,8 @@ def make_sample(config: GenerateConfig, seed: int, index: int, renderer: SceneRe
 
 def _place_of(config: GenerateConfig, index: int) -> tuple[int, int]:
     """The frame of a sample, and which of its samples it is."""
-    index = operator.index(index)  # NumPy's numbers are none of JSON's
+    check_kind(config, GenerateConfig, "generate_config makes one of a file, a name or settings")
+    index = whole(index, "index")
     if index < 0:
         raise FsidError(f"index {index}: must not be negative")
     return divmod(index, config.pairs_per_frame)
@@ -64,7 +64,7 @@ def make_frame(
     refused: why earlier attempts were, where that is known already.
     FsidError after `ATTEMPTS` attempts that were refused, and for a negative seed or frame.
     """
-    seed, frame = operator.index(seed), operator.index(frame)
+    seed, frame = whole(seed, "seed"), whole(frame, "frame")
     while len(refused) < ATTEMPTS:
         samples = Attempt(config, seed, frame, refused).samples(renderer)
         if isinstance(samples, list):

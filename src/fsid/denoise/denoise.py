@@ -27,10 +27,10 @@ import numpy as np
 from fsid.denoise.cut_off import drawn_anew, lowest_levels
 from fsid.denoise.ensemble import check_ensemble, self_ensemble
 from fsid.denoise.model import ModelCard
-from fsid.errors import FsidError
+from fsid.errors import FsidError, whole
 from fsid.sensor.light import GREY
 from fsid.sensor.mosaic import pack, site_offsets, unpack
-from fsid.sensor.raw import NoiseLevel, Raw, four
+from fsid.sensor.raw import NoiseLevel, Raw, check_raw, four
 
 MAX_STRENGTH = 100.0
 MAX_TOLD = 0.0036
@@ -85,6 +85,7 @@ def denoise_raw(
     network makes such.
     """
     check_raw(raw)
+    check_network(model)
     check_ensemble(ensemble)
     level = level if level is not None else raw.noise
     _check(raw, level, strength, tile_px)
@@ -131,10 +132,10 @@ def _stronger(level: NoiseLevel, times: float) -> NoiseLevel:
     return NoiseLevel(four(times * value for value in level.k), four(times * value for value in level.sigma2))
 
 
-def check_raw(raw: object) -> None:
-    """FsidError for a path or an array, of which nobody knows how to read it."""
-    if not isinstance(raw, Raw):
-        raise FsidError(f"a {type(raw).__name__} is no RAW image: give a Raw; read_raw reads one")
+def check_network(model: object) -> None:
+    """FsidError for the name of a network, or a function."""
+    if not hasattr(model, "averages"):
+        raise FsidError(f"model: a {type(model).__name__} is no network: give what load_model returns")
 
 
 def _check(raw: Raw, level: NoiseLevel | None, strength: float, tile_px: int) -> None:
@@ -147,7 +148,7 @@ def _check(raw: Raw, level: NoiseLevel | None, strength: float, tile_px: int) ->
     check_strength(level, strength)
     if not np.all(np.isfinite(raw.mosaic)):
         raise FsidError("this RAW holds NaN or infinity; read it again from its file")
-    if tile_px < 1:
+    if whole(tile_px, "tile_px") < 1:
         raise FsidError(f"tile_px {tile_px}: must be at least 1")
 
 

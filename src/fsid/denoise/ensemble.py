@@ -24,7 +24,7 @@ _SYMMETRIES = (0, 7, 3, 4, 1, 6, 2, 5)
 
 def check_ensemble(count: int) -> None:
     """FsidError for another number of copies than 1, 2, 4 and 8."""
-    if count not in (1, 2, 4, 8):
+    if count not in (1, 2, 4, 8) or isinstance(count, float):
         raise FsidError(f"ensemble {count}: must be 1, 2, 4 or 8 copies of the image")
 
 

@@ -7,13 +7,14 @@ from typing import Literal, get_args
 
 import torch
 
-from fsid.denoise.denoise import Network, check_raw, denoise_raw
+from fsid.denoise.denoise import Network, check_network, denoise_raw
 from fsid.denoise.files import noise_of
 from fsid.denoise.model import load_denoiser, model_path
 from fsid.denoise.onnx_denoiser import load_onnx, onnx_denoiser
 from fsid.errors import FsidError
 from fsid.sensor import CameraProfile, NoiseLevel, Raw, clean_levels
 from fsid.sensor.profiles import check_bayer
+from fsid.sensor.raw import check_raw
 
 Backend = Literal["torch", "onnx"]
 
@@ -63,8 +64,7 @@ def denoise(
     if isinstance(profile, NoiseLevel):
         raise FsidError("a NoiseLevel is no profile: it belongs to the image, replace(raw, noise=level)")
     network = load_model(model) if model is None or isinstance(model, str | Path) else model
-    if not hasattr(network, "averages"):
-        raise FsidError(f"model: a {type(network).__name__} is no network: give what load_model returns")
+    check_network(network)
     if isinstance(profile, CameraProfile):
         check_bayer(profile, f"profile {profile.name}")
         if iso is None and not raw.iso > 0:

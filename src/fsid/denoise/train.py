@@ -45,7 +45,7 @@ from fsid.denoise.sessions import Session, read_sessions
 from fsid.denoise.stabilise import stabilise
 from fsid.denoise.train_config import TrainConfig
 from fsid.denoise.validate import held_out, validation
-from fsid.errors import FsidError
+from fsid.errors import FsidError, check_kind
 from fsid.files import check_folder, held, write_atomically
 from fsid.sensor.profiles import load_bayer_profile, profiles_digest
 from fsid.terminal import Terminal
@@ -97,6 +97,7 @@ def train(
     work there, or a training that diverges. PyTorch's number of threads, its random numbers on the CPU and an
     Accelerator of your own are afterwards what they were.
     """
+    check_kind(config, TrainConfig, "train_config makes one of a file, a name or settings")
     data_dir, run_dir = Path(data_dir), Path(run_dir)
     config = sizes_as_begun(run_dir, config)
     if config.threads:

@@ -20,7 +20,7 @@ from fsid.counted import counted
 from fsid.errors import FsidError
 from fsid.evaluate.classical import denoise_classical
 from fsid.evaluate.metrics import psnr, ssim
-from fsid.evaluate.testset import ALL_SETS, TestImage, TestSet, read_testset
+from fsid.evaluate.testset import ALL_SETS, TestImage, TestSet, listed, read_testset
 from fsid.files import write_atomically
 from fsid.sensor import Raw, develop, read_raw, upright
 
@@ -119,6 +119,7 @@ def compare(
         raise FsidError(f"{root}: there is no method to compare")
     if twice := [name for name in names if names.count(name) > 1]:
         raise FsidError(f"{twice[0]}: two models have this name")
+    crop_levels = listed(crop_levels, "crop_levels")
     if unknown := set(crop_levels) - set(testset.levels):
         raise FsidError(f"{root}: has no level {', '.join(sorted(unknown))}")
     images: list[ImageRow] = []

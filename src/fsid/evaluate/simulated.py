@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from fsid.errors import FsidError
+from fsid.errors import FsidError, whole
 from fsid.evaluate.testbench import MATERIALS, simulate
-from fsid.evaluate.testset import Progress, TestImage, TestSet, capture, levels_of
+from fsid.evaluate.testset import Progress, TestImage, TestSet, capture, levels_of, listed
 from fsid.sensor import Raw, clean_from_linear, load_bayer_profile
 from fsid.sensor.light import GREY, KEY
 from fsid.sensor.profiles import profiles_digest
@@ -47,11 +47,12 @@ def simulated_testset(
     FsidError for a camera, levels, materials or sizes that cannot be used, or an `out` that is not empty.
     """
     profile = load_bayer_profile(camera)
-    isos, luxes = tuple(isos), tuple(luxes)
+    isos, luxes = listed(isos, "isos"), listed(luxes, "luxes")
     levels = levels_of(profile, isos, luxes or (() if isos else LUXES))
-    materials = tuple(materials) or tuple(MATERIALS)
+    materials = listed(materials, "materials") or tuple(MATERIALS)
     if unknown := set(materials) - set(MATERIALS):
         raise FsidError(f"{sorted(unknown)[0]}: no such material; choose from {', '.join(MATERIALS)}")
+    scenes, width, height = whole(scenes, "scenes"), whole(width, "width"), whole(height, "height")
     if not (1 <= frames <= 100 and scenes >= 1):
         raise FsidError(f"--frames {frames}: 1 to 100 are possible, and --scenes must be at least 1")
     if min(width, height) < 64 or max(width, height) > _LARGEST_PX or width % 2 or height % 2:

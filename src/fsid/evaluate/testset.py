@@ -19,7 +19,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -42,6 +42,7 @@ from fsid.sensor.light import LONGEST_EXPOSURE_S
 from fsid.sensor.profiles import profiles_digest
 
 Progress = Callable[[int, int], None]
+T = TypeVar("T")
 
 TESTSET_FILE = "testset.json"
 _STEM = 60
@@ -196,9 +197,16 @@ class Setting(NamedTuple):
     exposure_s: float
 
 
+def listed(values: Iterable[T], name: str) -> tuple[T, ...]:
+    """FsidError, naming them, for one value, or a text: for Python a list of letters."""
+    if isinstance(values, str) or not isinstance(values, Iterable):
+        raise FsidError(f"{name}: {values!r} is not a list; give [{values!r}]")
+    return tuple(values)
+
+
 def levels_of(profile: CameraProfile, isos: Iterable[float], luxes: Iterable[float]) -> dict[str, Setting]:
     """The camera's setting at every level by name; FsidError where there is none, or one that cannot be."""
-    isos, luxes = tuple(isos), tuple(luxes)
+    isos, luxes = listed(isos, "isos"), listed(luxes, "luxes")
     if not (isos or luxes) or not all(0 < level < np.inf for level in (*isos, *luxes)):
         raise FsidError("--iso: at least one positive ISO (or --lux) is needed, and no infinite one")
     levels = {

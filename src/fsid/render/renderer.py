@@ -21,7 +21,7 @@ from typing import ClassVar, NoReturn, Self
 import moderngl
 import numpy as np
 
-from fsid.errors import FsidError
+from fsid.errors import FsidError, whole
 from fsid.render.buffers import Buffers
 from fsid.render.camera import lens_of
 from fsid.render.colour_contrast import set_colour_contrast
@@ -97,13 +97,13 @@ class Renderer:
             raise FsidError(
                 "a Renderer is already open in this process: close it first, or use another process"
             )
-        if not 1 <= supersampling <= 4:
+        if not 1 <= whole(supersampling, "supersampling") <= 4:
             raise FsidError(f"supersampling {supersampling}: must be 1 .. 4")
-        if not 64 <= texture_size <= 8192 or texture_size & (texture_size - 1):
+        if not 64 <= whole(texture_size, "texture_size") <= 8192 or texture_size & (texture_size - 1):
             raise FsidError(f"texture_size {texture_size}: must be a power of two from 64 to 8192")
         if quality not in QUALITIES:
             raise FsidError(f"quality '{quality}': use {' or '.join(QUALITIES)}")
-        if lens_images < 1:
+        if whole(lens_images, "lens_images") < 1:
             raise FsidError(f"lens_images {lens_images}: must be at least 1")
         self._quality = QUALITIES[quality]
         self._lens_images = lens_images

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fsid.errors import FsidError
+from fsid.errors import FsidError, check_kind
 from fsid.scene.model import Camera, Light, Material, Scene
 
 LIGHT_KINDS = ("point", "spot", "sun", "area")
@@ -17,8 +17,7 @@ _SHARES = ("clearcoat", "clearcoat_roughness", "sheen", "translucency", "transmi
 
 def check_scene(scene: Scene) -> None:
     """FsidError that names the value which makes no sense, by its key in the scene's JSON."""
-    if not isinstance(scene, Scene):
-        raise FsidError(f"a {type(scene).__name__} is no Scene; scene_from_json makes one of JSON's text")
+    check_kind(scene, Scene, "scene_from_json makes one of JSON's text")
     for i, camera in enumerate(scene.cameras):
         _check_camera(f"scene.cameras[{i}]", camera)
     for i, light in enumerate(scene.lights):

@@ -16,13 +16,12 @@ Background, lights and cameras vary alike in all four.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from operator import index
 from typing import NamedTuple
 
 import numpy as np
 
 from fsid.assets import build_mesh
-from fsid.errors import FsidError
+from fsid.errors import FsidError, check_kind, whole
 from fsid.scene.choice import pick_rand
 from fsid.scene.colour import Mood
 from fsid.scene.config import SceneConfig
@@ -68,7 +67,8 @@ def sample(
 
     seed: >= 0. width, height: even, 16 .. 16384. variant: one of VARIANTS. Raises FsidError.
     """
-    seed, width, height = (index(value) for value in (seed, width, height))  # NumPy's are no JSON
+    check_kind(config, SceneConfig, "SceneConfig(objects=(4, 6)) makes one")
+    seed, width, height = whole(seed, "seed"), whole(width, "width"), whole(height, "height")
     _check(seed, width, height, variant)
     streams, fixed = _streams(seed), _streams(_FIXED_SEED)
     B, mood = background_rand(np.random.default_rng(streams.B), config)

@@ -14,7 +14,7 @@ import numpy as np
 from fsid.sensor.colour import apply_matrix, camera_to_srgb_matrix
 from fsid.sensor.demosaic import demosaic
 from fsid.sensor.mosaic import SITE_CHANNEL, site_offsets
-from fsid.sensor.raw import Raw
+from fsid.sensor.raw import Raw, check_raw
 from fsid.sensor.tone import srgb_encode
 
 _TURNED, _UPSIDE_DOWN, _MIRRORED = {5, 6, 7, 8}, {3, 4, 7, 8}, {2, 3, 6, 7}  # orientations
@@ -24,6 +24,7 @@ _STRIP = 8  # rows at once: what is in between stays in the cache
 
 def develop(raw: Raw) -> np.ndarray:
     """Picture (H, W, 3) float32, sRGB-encoded 0..1, of a RAW of at least 4x4 pixels. No tone curve."""
+    check_raw(raw)
     picture, matrix = _camera_rgb(raw), camera_to_srgb_matrix(raw.xyz_to_camera)
     for first in range(0, len(picture), _STRIP):
         rows = slice(first, first + _STRIP)
@@ -33,6 +34,7 @@ def develop(raw: Raw) -> np.ndarray:
 
 def develop_linear(raw: Raw) -> np.ndarray:
     """Linear sRGB (H, W, 3) float32; 1 is sensor saturation, values below 0 and above 1 are kept."""
+    check_raw(raw)
     return apply_matrix(camera_to_srgb_matrix(raw.xyz_to_camera), _camera_rgb(raw))
 
 

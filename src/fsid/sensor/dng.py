@@ -8,6 +8,7 @@ a tar shard. The same image gives the same bytes: no clock, no software version.
 
 from __future__ import annotations
 
+import io
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -30,7 +31,7 @@ from fsid.sensor.intact import check_intact, check_order
 from fsid.sensor.metadata import Metadata, kept_metadata, libraw_metadata, taken
 from fsid.sensor.mosaic import CFA_PATTERNS
 from fsid.sensor.quantise import to_dn
-from fsid.sensor.raw import Raw
+from fsid.sensor.raw import Raw, check_raw
 from fsid.sensor.tiff import (
     CFA,
     EXIF_IFD,
@@ -62,6 +63,7 @@ def write_dng(target: str | Path | BinaryIO, raw: Raw, preview: np.ndarray | Non
     pattern that is not Bayer, levels that are no whole DN, gains of a white balance or numbers of a matrix
     that come back as others, a noise level that is none.
     """
+    check_raw(raw)
     data = _dng_bytes(raw, preview)
     if not isinstance(target, str | Path):
         target.write(data)
@@ -118,6 +120,10 @@ def read_raw(path: str | Path | BinaryIO) -> Raw:
     Foveon, linear DNG, monochrome), floating point, black levels or colours that cannot be.
     """
     given = Path(path) if isinstance(path, str) else path
+    if isinstance(given, io.TextIOBase) or not (isinstance(given, Path) or hasattr(given, "seek")):
+        raise FsidError(
+            f"a {type(path).__name__} is no RAW file: give a path or a binary file, of bytes io.BytesIO(data)"
+        )
     with _opened(given) as (file, source):
         return _from_libraw(file, source, _named(given))
 

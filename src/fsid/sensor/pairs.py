@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fsid.errors import FsidError
+from fsid.errors import FsidError, check_kind
 from fsid.sensor.colour import colour_rand
 from fsid.sensor.exposure import expose
 from fsid.sensor.mosaic import mosaic
@@ -31,11 +31,13 @@ if TYPE_CHECKING:  # RAW files are read and developed on machines without a grap
 PHOTO_EXPOSURE_MEAN = 0.8  # Brooks et al. 2019: brightness gain is 1 / N(0.8, 0.1)
 PHOTO_EXPOSURE_SIGMA = 0.1
 PHOTO_EXPOSURE_RANGE = (0.5, 1.1)
+_GENERATOR = "numpy.random.default_rng(seed) makes one"
 _STRIP = 32  # rows at once, an even number: what is in between stays in the cache
 
 
 def clean_from_frame(rng: np.random.Generator, frame: Frame, profile: CameraProfile) -> Raw:
     """Expose a rendered frame with a random auto-exposure; see `clean_from_linear`."""
+    _check_given(rng, profile)
     return clean_from_linear(rng, expose(rng, frame.radiance), profile)
 
 
@@ -51,6 +53,7 @@ def clean_from_linear(
     column is dropped. FsidError for another shape, integers, NaN and infinity in either, and for an exposure
     below 0.
     """
+    _check_given(rng, profile)
     check_linear(linear_srgb)
     if not (np.isfinite(exposure).all() and np.min(exposure) >= 0):
         raise FsidError(f"the exposure of linear light must be finite and not negative; got {exposure}")
@@ -71,6 +74,7 @@ def clean_from_photo(rng: np.random.Generator, srgb: np.ndarray, profile: Camera
 
     An odd last row or column is dropped. FsidError for what is no such photo.
     """
+    _check_given(rng, profile)
     check_srgb(srgb)
     matrix, gains = colour_rand(rng, profile.xyz_to_camera)
     exposure = float(np.clip(rng.normal(PHOTO_EXPOSURE_MEAN, PHOTO_EXPOSURE_SIGMA), *PHOTO_EXPOSURE_RANGE))
@@ -94,12 +98,20 @@ def noisy_from_clean(
     the terms leave out rounding, the result has these finer levels, and a file does not round it either.
     terms, unit, exposure_s: what the camera does beyond the paper's model; see `terms`.
     """
+    check_kind(rng, np.random.Generator, _GENERATOR)
+    check_kind(level, NoiseLevel, "that of a profile is profile.level(iso)")
     injected = before_converter(level, clean.white_level - clean.black_level) if terms.quantisation else level
     if terms == PAPER:
         noisy = add_noise(rng, clean, injected)
     else:
         noisy = add_noise_terms(rng, clean, injected, terms, unit=unit, exposure_s=exposure_s)
     return replace(quantise(noisy) if terms.quantisation else clean_levels(noisy), iso=iso, noise=level)
+
+
+def _check_given(rng: object, profile: object) -> None:
+    """FsidError for a seed in place of a generator, and for the name of a profile."""
+    check_kind(rng, np.random.Generator, _GENERATOR)
+    check_kind(profile, CameraProfile, "load_profile reads one by its name")
 
 
 def _raw(x: np.ndarray, matrix: np.ndarray, gains: tuple[float, float, float], profile: CameraProfile) -> Raw:

@@ -97,6 +97,9 @@ class Raw:
         if np.shape(self.xyz_to_camera) != (3, 3):
             raise FsidError(f"xyz_to_camera has shape {np.shape(self.xyz_to_camera)}; expected (3, 3)")
 
+        if not isinstance(self.iso, int | float):
+            raise FsidError(f"iso {self.iso!r}: must be a number, 0 where it is unknown")
+
     def _check_levels(self) -> None:
         levels = self.black_level, self.white_level
         if not all(isinstance(level, int | float) for level in levels):
@@ -105,6 +108,12 @@ class Raw:
             )
         if not levels[0] < levels[1]:
             raise FsidError(f"black level {levels[0]:g} is not below white level {levels[1]:g}")
+
+
+def check_raw(raw: object) -> None:
+    """FsidError for a path or an array, of which nobody knows how to read it."""
+    if not isinstance(raw, Raw):
+        raise FsidError(f"a {type(raw).__name__} is no RAW image: give a Raw; read_raw reads one")
 
 
 def _gains(white_balance: Any) -> tuple[float, float, float]:
