@@ -19,7 +19,7 @@ from fsid.files import make_folder, read_whole, write_atomically
 
 
 def make_only(
-    out: Path,
+    out: str | Path,
     key: str,
     config: GenerateConfig | None,
     seed: int | None,
@@ -32,6 +32,7 @@ def make_only(
     what it is, redrawn or not; where there are shards and none of them has it, note(line) is called.
     FsidError: unusable key or settings, or others than those of the dataset.
     """
+    out = Path(out)
     make_folder(out)
     sample = _from_json(Path(key)) if key.endswith(".json") else _from_key(out, key, config, seed, note)
     paths = []

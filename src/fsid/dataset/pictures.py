@@ -46,8 +46,9 @@ class Picture:
     is_linear: bool
 
 
-def find_pictures(folder: Path) -> list[Path]:
+def find_pictures(folder: str | Path) -> list[Path]:
     """The photographs and .exr files directly inside `folder`, by name; FsidError where there is none."""
+    folder = Path(folder)
     if not folder.is_dir():
         raise FsidError(f"{folder}: is not a folder of photographs or .exr renders")
     suffixes = (*PHOTO_SUFFIXES, EXR_SUFFIX)

@@ -21,9 +21,11 @@ def psnr(image: np.ndarray, truth: np.ndarray) -> float:
     """Peak signal-to-noise ratio in dB of two arrays of equal shape, 0..1; inf where equal.
 
     NaN where a value is infinite or NaN: clipped, an image of such values would be white, and comparable.
+    Tensors of PyTorch on a CPU will do, too.
 
     FsidError for arrays of different shapes or of integers, and for a truth that looks like 0..255.
     """
+    image, truth = np.asarray(image), np.asarray(truth)
     _check_alike(image, truth)
     if not (np.isfinite(image).all() and np.isfinite(truth).all()):
         return float("nan")
@@ -38,6 +40,7 @@ def ssim(image: np.ndarray, truth: np.ndarray) -> float:
     NaN as in `psnr`.
     FsidError as in `psnr`, and for images of less than 11x11 pixels.
     """
+    image, truth = np.asarray(image), np.asarray(truth)
     _check_alike(image, truth)
     if image.ndim != 3 or min(image.shape[:2]) < _WINDOW_PX:
         raise FsidError(

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from fsid.counted import counted
 from fsid.errors import FsidError
@@ -20,19 +21,23 @@ from fsid.evaluate.compare import (
     write_results,
 )
 from fsid.evaluate.testset import TestSet, read_testset
-from fsid.files import make_folder
+from fsid.files import make_folder, paths_of
 from fsid.sensor import read_raw
 
+if TYPE_CHECKING:
+    from fsid.denoise import Network
 
-def model_method(path: str | Path, name: str, *, ensemble: int = 1) -> Method:
-    """A trained model (as `load_model` takes it) as a method; its card says what it was trained on. ensemble:
-    as for `denoise_raw`."""
+
+def model_method(model: Network | str | Path, name: str, *, ensemble: int = 1) -> Method:
+    """A trained model, loaded or as `load_model` takes it, as a method; its card says what it was trained on.
+    ensemble: as for `denoise_raw`."""
     from fsid.denoise import denoise_raw, load_model
-    from fsid.denoise.denoise import most_noise
+    from fsid.denoise.denoise import check_network, most_noise
 
-    model = load_model(path)
-    denoise = partial(denoise_raw, model=model, ensemble=ensemble)
-    return Method(name, model.card.training, denoise, most_noise(model.card))
+    network = load_model(model) if isinstance(model, str | Path) else model
+    check_network(network)
+    denoise = partial(denoise_raw, model=network, ensemble=ensemble)
+    return Method(name, network.card.training, denoise, most_noise(network.card))
 
 
 def model_names(models: Sequence[str | Path]) -> list[str]:
@@ -59,18 +64,20 @@ def _short_name(path: Path) -> str:
 
 def evaluate_models(
     testset: str | Path,
-    models: Sequence[str | Path],
+    models: str | Path | Iterable[str | Path],
     *,
     ensemble: int = 1,
     progress: Callable[[int, int], None] = lambda done, total: None,
     note: Callable[[str], None] = lambda line: None,
 ) -> Comparison:
-    """Compare the baselines and `models` (as `load_model` takes them), with crops of the middle level.
+    """Compare the baselines and `models`, as `load_model` takes them, one or more, with crops of the middle
+    level.
 
     ensemble: of each model, as for `denoise_raw`; where it is not 1 their names say so. note: told in one
     line of each model at which levels the test set holds more noise than it knows, and which results have no
     error.
     """
+    models = paths_of(models)
     made = read_testset(testset)
     levels = made.levels
     copies = "" if ensemble == 1 else f" (mean of {ensemble})"
