@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import io
 import json
+import multiprocessing
 import os
 import shutil
 import signal
@@ -308,6 +309,18 @@ def test_a_run_keeps_the_sizes_that_it_was_begun_with(data: Path, tmp_path: Path
     train(data, run, replace(CONFIG, steps=2), quiet=True)
     with pytest.raises(FsidError, match="another shrink"):
         train(data, run, replace(CONFIG, shrink=(1,), steps=2), quiet=True)
+
+
+def test_an_error_that_is_kept_keeps_no_loader_processes(data: Path, tmp_path: Path) -> None:
+    """A notebook keeps the last one, with all that its frames refer to."""
+
+    def stop(step: int, steps: int) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt) as kept:
+        train(data, tmp_path / "run", replace(CONFIG, steps=50, loader_processes=1), progress=stop)
+    assert kept.tb
+    assert not multiprocessing.active_children()
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Iterator
+from collections.abc import Generator
 
 from torch.utils.data import DataLoader, Dataset
 
@@ -21,7 +21,9 @@ from fsid.errors import FsidError
 _AHEAD = 2  # batches that each process is asked for beyond the one in use
 
 
-def batches(patches: PatchDataset, steps: range, processes: int = 0, *, pin: bool = False) -> Iterator[Batch]:
+def batches(
+    patches: PatchDataset, steps: range, processes: int = 0, *, pin: bool = False
+) -> Generator[Batch, None, None]:
     """`patches[step]` for all `steps`, made by so many other processes; 0: here.
 
     A batch of other processes is valid until the next one is asked for: clone the tensors that are to be

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import closing, contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -127,7 +127,10 @@ def train(
         state = load_checkpoint(run_dir, bare, optimizer)
         forward = torch.compile(net) if _compiles(config) else net
         feed = batches(patches, range(state.step, config.steps), config.loader_processes, pin=gpu)
-        with LiveLine(config, state.step, accelerator.num_processes, quiet=not shown) as live:
+        with (
+            closing(feed),  # a notebook keeps the frames of an error, and with them the loader's processes
+            LiveLine(config, state.step, accelerator.num_processes, quiet=not shown) as live,
+        ):
             card = _card(data_dir, config, patches.mosaics, initial)
             keeper = _Keeper(data_dir, run_dir, config, kept, accelerator, card, command, state, live)
             for batch in feed:
