@@ -27,6 +27,20 @@ from fsid.pace import Pace
 from fsid.terminal import Terminal
 
 
+def test_a_notebook_without_widgets_has_lines(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture):
+    """rich would show nothing there but a warning to install ipywidgets."""
+    pytest.importorskip("torch")
+    from fsid.denoise import TrainConfig
+    from fsid.denoise.live import LiveLine
+
+    monkeypatch.setattr("rich.console._is_jupyter", lambda: True)
+    monkeypatch.setattr("fsid.terminal.find_spec", lambda name: None)
+    with LiveLine(TrainConfig(steps=9), 0, 1, quiet=False) as live:
+        live._pace._told -= 100
+        live.update(1, 0.5, 30.0)
+    assert "train: 1/9  loss 0.500" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("arguments", [["--help"], ["generate", "--help"], ["profiles", "--help"]])
 def test_a_closed_pipe_ends_a_command_quietly(arguments: list[str]) -> None:
     """As `fsid ... | head` does."""

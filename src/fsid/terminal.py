@@ -10,6 +10,8 @@ import errno
 import os
 import re
 from collections.abc import Iterable
+from importlib.util import find_spec
+from typing import Any
 
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
@@ -20,7 +22,12 @@ _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 
 
 class Terminal(Console):
-    """rich's console, which styles by sequences of its own."""
+    """rich's console, which styles by sequences of its own. In a notebook it needs ipywidgets for what moves,
+    and would warn in place of all that it has to say; without them a notebook has lines, as a batch job has.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(force_jupyter=None if find_spec("ipywidgets") else False, **options)
 
     def on_broken_pipe(self) -> None:
         """Raised as what it is, where rich would exit with code 1."""
