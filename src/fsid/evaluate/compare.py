@@ -217,7 +217,7 @@ def detailed_window(srgb: np.ndarray, size_px: int) -> tuple[tuple[slice, slice]
 
 
 def write_results(rows: Sequence[Row], file: str | Path) -> None:
-    """Write results.json: a list of rows, figures rounded to 1e-4; null for the PSNR of equal images."""
+    """Write results.json: a list of rows, figures rounded to 1e-4; null for one that is not finite."""
 
     def plain(value: object) -> object:
         if not isinstance(value, float):
