@@ -676,3 +676,13 @@ def test_pixel_offset_of_no_dng_is_an_error(tmp_path):
     (tmp_path / "note.dng").write_bytes(b"text")
     with pytest.raises(FsidError, match=r"note\.dng"):
         dng_pixel_offset(tmp_path / "note.dng")
+    with pytest.raises(FsidError, match=r"none\.dng: cannot be read"):
+        dng_pixel_offset(tmp_path / "none.dng")
+
+
+def test_pixel_offset_of_a_file_that_was_read_before():
+    file = io.BytesIO()
+    write_dng(file, Raw(np.zeros((32, 32), np.float32), "RGGB", 64, 1023, (2.0, 1.0, 1.5), np.eye(3)))
+    offset = dng_pixel_offset(file)
+    read_raw(file)
+    assert dng_pixel_offset(file) == offset

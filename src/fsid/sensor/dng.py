@@ -77,8 +77,12 @@ def dng_pixel_offset(dng: str | Path | BinaryIO) -> int:
     FsidError for a file that is no such DNG.
     """
     if isinstance(dng, str | Path):
-        with Path(dng).open("rb") as file:
-            return dng_pixel_offset(file)
+        try:
+            with Path(dng).open("rb") as file:
+                return dng_pixel_offset(file)
+        except OSError as error:
+            raise FsidError(f"{dng}: cannot be read ({error.strerror})") from None
+    dng.seek(0)
     offsets = _mosaic_directory(read_directories(dng)).get(STRIP_OFFSETS)
     if offsets is None:
         raise FsidError(f"{getattr(dng, 'name', 'DNG')}: not a DNG file that FSID wrote")
