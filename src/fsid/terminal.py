@@ -22,8 +22,8 @@ _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 
 
 class Terminal(Console):
-    """rich's console, which styles by sequences of its own. In a notebook it needs ipywidgets for what moves,
-    and would warn in place of all that it has to say; without them a notebook has lines, as a batch job has.
+    """rich's console, which styles by sequences of its own. In a notebook rich needs ipywidgets for what
+    moves, and warns in place of all that it has to say; without them a notebook is written to as a terminal.
     """
 
     def __init__(self, **options: Any) -> None:
