@@ -786,6 +786,18 @@ def test_a_gpu_whose_memory_is_too_small_is_one_line(
         train(data, tmp_path / "run", CONFIG, quiet=True)
 
 
+def test_a_loader_process_that_is_killed_is_one_line(data: Path, tmp_path: Path) -> None:
+    """As the kernel does where memory runs out."""
+
+    def kill(done: int, steps: int) -> None:
+        if done == 1:
+            multiprocessing.active_children()[0].kill()
+
+    config = replace(CONFIG, steps=10_000, loader_processes=1)
+    with pytest.raises(FsidError, match=r"loader_processes: DataLoader worker \(pid.*goes on$"):
+        train(data, tmp_path / "run", config, progress=kill)
+
+
 def test_a_machine_without_a_compiler_is_one_line(
     data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -10,10 +10,13 @@ import torch
 from fsid.denoise.train_config import TrainConfig
 from fsid.errors import FsidError
 
+_WORKER = "DataLoader worker"  # how its error begins
+
 
 @contextmanager
 def machine_limits(config: TrainConfig) -> Iterator[None]:
-    """FsidError where a GPU's memory does not hold a step, or where torch.compile finds no compiler."""
+    """FsidError where a GPU's memory does not hold a step, where torch.compile finds no compiler, and where a
+    loader process was killed."""
     try:
         yield
     except torch.OutOfMemoryError:
@@ -22,6 +25,11 @@ def machine_limits(config: TrainConfig) -> Iterator[None]:
             "lower one of the two"
         ) from None
     except RuntimeError as error:
+        if str(error).startswith(_WORKER):  # PyTorch raises it at whatever line the parent is
+            raise FsidError(
+                f"loader_processes: {str(error).strip(' .')}; where memory ran out take fewer of them, "
+                "and the same command goes on"
+            ) from None
         from torch._dynamo.exc import BackendCompilerFailed  # here, since its import takes a second
 
         if not isinstance(error, BackendCompilerFailed):

@@ -128,6 +128,7 @@ def train(
         forward = torch.compile(net) if _compiles(config) else net
         feed = batches(patches, range(state.step, config.steps), config.loader_processes, pin=gpu)
         with (
+            machine_limits(config),
             closing(feed),  # a notebook keeps the frames of an error, and with them the loader's processes
             LiveLine(config, state.step, accelerator.num_processes, quiet=not shown) as live,
         ):
@@ -135,8 +136,7 @@ def train(
             keeper = _Keeper(data_dir, run_dir, config, kept, accelerator, card, command, state, live)
             for batch in feed:
                 rate = learning_rate(config, state.step)
-                with machine_limits(config):
-                    loss, psnr = _step(accelerator, forward, net, optimizer, batch, rate, config)
+                loss, psnr = _step(accelerator, forward, net, optimizer, batch, rate, config)
                 state.advance(bare, config.ema_decay)
                 live.update(state.step, loss, psnr)
                 is_due = state.step % config.log_every == 0 or state.step == config.steps
