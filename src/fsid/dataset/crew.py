@@ -166,7 +166,7 @@ def _hopeless(last: Lost, place: str) -> str:
     return (
         f"no worker lives long enough to make anything: the last died at {place} ({last.reason}). "
         "Is there too little memory, does `python -c 'import fsid.dataset'` fail, or does a script of yours "
-        "call fsid outside `if __name__ == '__main__':`?"
+        "call fsid outside `if __name__ == '__main__':`, or come through a pipe (python < script.py)?"
     )
 
 
