@@ -628,7 +628,7 @@ def test_what_is_no_network_noise_or_backend_is_named(network: Path) -> None:
 
 
 def test_a_path_is_not_denoised_before_it_is_read() -> None:
-    with pytest.raises(FsidError, match="a str is no RAW image: give a Raw; read_raw reads one"):
+    with pytest.raises(FsidError, match="a str is no Raw: read_raw reads one"):
         fsid.denoise("photo.dng")
 
 

@@ -134,7 +134,7 @@ def test_bad_input_is_named(rng: np.random.Generator) -> None:
         denoise_raw(noisy, model, NoiseLevel((1e30,) * 4, (0.0,) * 4))
     with pytest.raises(FsidError, match="four values each"):
         denoise_raw(noisy, model, NoiseLevel((1e-3,), (1e-5,)))  # type: ignore[arg-type]
-    with pytest.raises(FsidError, match="a ndarray is no RAW image: give a Raw; read_raw reads one"):
+    with pytest.raises(FsidError, match="a ndarray is no Raw: read_raw reads one"):
         denoise_raw(noisy.mosaic, model)  # type: ignore[arg-type]
     with torch.no_grad():
         (exploding := denoiser()).net.net.ending.weight.fill_(1e30)

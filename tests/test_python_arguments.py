@@ -59,9 +59,9 @@ def simulated(**settings: Any) -> object:
 
 
 MISTAKES: dict[str, tuple[Callable[[], object], str]] = {
-    "a path for a RAW": (lambda: fsid.develop("x.dng"), "a str is no RAW image"),
-    "an array for a RAW": (lambda: develop_linear(LIGHT), "a ndarray is no RAW image"),
-    "the RAW first": (lambda: fsid.write_dng(raw(), "x.dng"), "a str is no RAW image"),
+    "a path for a RAW": (lambda: fsid.develop("x.dng"), "a str is no Raw: read_raw reads one"),
+    "an array for a RAW": (lambda: develop_linear(LIGHT), "a ndarray is no Raw: read_raw reads one"),
+    "the RAW first": (lambda: fsid.write_dng(raw(), "x.dng"), "a str is no Raw: read_raw reads one"),
     "bytes for a file": (lambda: fsid.read_raw(b"II*"), r"a bytes is no RAW file: .*io.BytesIO"),
     "a text file": (lambda: fsid.read_raw(io.StringIO("II*")), "a StringIO is no RAW file"),
     "an ISO in words": (lambda: replace(raw(), iso="800"), "iso '800': must be a number"),

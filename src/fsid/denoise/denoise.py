@@ -27,7 +27,7 @@ import numpy as np
 from fsid.denoise.cut_off import drawn_anew, lowest_levels
 from fsid.denoise.ensemble import check_ensemble, self_ensemble
 from fsid.denoise.model import ModelCard
-from fsid.errors import FsidError, whole
+from fsid.errors import FsidError, check_kind, whole
 from fsid.sensor.light import GREY
 from fsid.sensor.mosaic import pack, site_offsets, unpack
 from fsid.sensor.raw import NoiseLevel, Raw, check_raw, four
@@ -143,8 +143,7 @@ def _check(raw: Raw, level: NoiseLevel | None, strength: float, tile_px: int) ->
         raise FsidError(
             "the noise level of this RAW is unknown: give a profile and an ISO (--profile, --iso)"
         )
-    if not isinstance(level, NoiseLevel):
-        raise FsidError(f"a {type(level).__name__} is no NoiseLevel; that of a profile is profile.level(iso)")
+    check_kind(level, NoiseLevel, "that of a profile is profile.level(iso)")
     check_strength(level, strength)
     if not np.all(np.isfinite(raw.mosaic)):
         raise FsidError("this RAW holds NaN or infinity; read it again from its file")

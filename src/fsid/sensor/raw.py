@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from fsid.errors import FsidError
+from fsid.errors import FsidError, check_kind
 from fsid.sensor.metadata import Metadata
 
 CFA_PATTERNS = ("RGGB", "BGGR", "GRBG", "GBRG")
@@ -112,8 +112,7 @@ class Raw:
 
 def check_raw(raw: object) -> None:
     """FsidError for a path or an array, of which nobody knows how to read it."""
-    if not isinstance(raw, Raw):
-        raise FsidError(f"a {type(raw).__name__} is no RAW image: give a Raw; read_raw reads one")
+    check_kind(raw, Raw, "read_raw reads one")
 
 
 def _gains(white_balance: Any) -> tuple[float, float, float]:
