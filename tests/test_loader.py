@@ -22,6 +22,7 @@ import tifffile
 torch = pytest.importorskip("torch")
 
 from fsid.config import save_settings  # noqa: E402
+from fsid.dataset import index  # noqa: E402
 from fsid.dataset.cells import Grid  # noqa: E402
 from fsid.dataset.config import DatasetConfig, GenerateConfig  # noqa: E402
 from fsid.dataset.feed import batches  # noqa: E402
@@ -98,6 +99,24 @@ def test_the_index_points_at_the_pixels_that_libraw_reads(dataset: Path, tmp_pat
         assert (mosaic.cfa, mosaic.black_level, mosaic.white_level) == (read.cfa, 4096, 65472)
         x = (stored.reshape(mosaic.height, mosaic.width) - 4096.0) / (65472 - 4096)
         np.testing.assert_allclose(x, read.mosaic, atol=1e-6)
+
+
+def test_headers_are_read_once_until_a_file_changes(dataset: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A start of a training asks three times, and 175,000 images cost minutes each time."""
+    opened: list[Path] = []
+    read = index._index_shard
+    monkeypatch.setattr(index, "_index_shard", lambda *what: opened.append(what[0]) or read(*what))
+    first = index_mosaics(dataset)
+    PatchDataset(dataset, CONFIG, seed=0)
+    assert index_mosaics(dataset) == first
+    assert len(opened) == 2
+    samples = read_samples(shard_path(dataset, 1))
+    write_shard(shard_path(dataset, 1), [(f"{int(key) + 5:08d}", files) for key, files in samples.items()])
+    assert [mosaic.key[-1] for mosaic in index_mosaics(dataset)] == ["0", "1", "7", "8"]
+    save_settings(DatasetConfig(0, 2, GenerateConfig(noise_levels=2)), dataset / "config.yaml")
+    assert [mosaic.scene for mosaic in index_mosaics(dataset)] == [0, 0, 3, 4]
+    shard_path(dataset, 0).unlink()
+    assert [mosaic.key[-1] for mosaic in index_mosaics(dataset)] == ["7", "8"]
 
 
 @pytest.mark.parametrize("cfa", CFA_PATTERNS)

@@ -69,13 +69,32 @@ class StoredMosaic:
 def index_mosaics(data_dir: str | Path, kind: MosaicKind = "clean") -> tuple[StoredMosaic, ...]:
     """All mosaics of one kind in `data_dir`/shard-*.tar, in the order of shards and samples.
 
-    Raises FsidError where there is no shard, no sample, a key that comes twice, or a shard or DNG that is not
-    readable as described above.
+    The dataset read last is remembered until one of its files changes: a training asks more than once, and
+    each image costs a millisecond. Raises FsidError where there is no shard, no sample, a key that comes
+    twice, or a shard or DNG that is not readable as described above.
     """
     data_dir = Path(data_dir)
+    shards = tuple(find_shards(data_dir))
+    return _index(data_dir, kind, shards, tuple(map(_stamp, (*shards, data_dir / "config.yaml"))))
+
+
+def _stamp(file: Path) -> tuple[int, ...]:
+    """What changes with the content of a file; () where there is none."""
+    try:
+        found = file.stat()
+    except FileNotFoundError:
+        return ()
+    return found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns
+
+
+@lru_cache(maxsize=2)  # clean and noisy mosaics
+def _index(
+    data_dir: Path, kind: MosaicKind, shards: tuple[Path, ...], stamps: tuple[tuple[int, ...], ...]
+) -> tuple[StoredMosaic, ...]:
+    """`index_mosaics` of files that are as `stamps` says."""
     origin = _origin(data_dir)
     found: dict[str, StoredMosaic] = {}
-    for shard in find_shards(data_dir):
+    for shard in shards:
         for mosaic in _index_shard(shard, f".{kind}.dng"):
             if mosaic.key in found:
                 raise FsidError(
