@@ -14,7 +14,7 @@ from fsid.config import load_settings
 from fsid.dataset import GenerateConfig, encode, make_frame, make_sample, remake, shard_path, write_shard
 from fsid.dataset.checks import distance, fingerprint, flaw
 from fsid.dataset.config import Checks, split_of
-from fsid.dataset.settle import REDRAWS, settle
+from fsid.dataset.settle import REDRAWS, Looks, settle
 from fsid.dataset.shards import read_records, read_samples
 from fsid.errors import FsidError
 from fsid.scene import Scene
@@ -177,6 +177,24 @@ def test_photographs_are_no_source_for_super_resolution(photos: Path) -> None:
 class PaintingWorker:
     def renderer(self, config: GenerateConfig) -> Painter:
         return Painter()
+
+
+def test_alike_are_fingerprints_of_which_at_most_so_many_bits_differ(rng: np.random.Generator) -> None:
+    """In whichever of their words, and among more than memory is taken for at first."""
+    known = rng.integers(0, 2**64, (3000, 4), dtype=np.uint64)
+    looks = Looks(8)
+    looks.add(known[:1000])
+    looks.add(known[1000:])
+    for bits in (0, 8, 9):
+        for word in range(4):
+            like = known[[17, 2900]].copy()
+            like[:, word] ^= np.uint64(2**bits - 1) << np.uint64(20)
+            assert looks.has(like[:1]) == looks.has(like[1:]) == (bits <= 8)
+        across = known[2900:2901].copy().view(np.uint8)
+        across[0, rng.permutation(32)[:bits]] ^= 1
+        assert looks.has(across.view(np.uint64)) == (bits <= 8)
+    looks.forget(2000)
+    assert not looks.has(known[2900:2901])
 
 
 def settled(

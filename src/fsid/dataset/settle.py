@@ -30,21 +30,25 @@ class Looks:
 
     def __init__(self, near_bits: int) -> None:
         self._near_bits = near_bits
-        self._rows = np.empty((1024, 4), np.uint64)
+        self._words = np.empty((4, 1024), np.uint64)  # those of a fingerprint in a column
         self.count = 0
 
     def has(self, looks: np.ndarray) -> bool:
         """Whether one of `looks` (n, 4) is like one of the known."""
-        known = self._rows[: self.count]
-        return any(
-            bool((np.bitwise_count(known ^ row).sum(1, dtype=int) <= self._near_bits).any()) for row in looks
-        )
+        return any(self._has(row) for row in looks)
+
+    def _has(self, row: np.ndarray) -> bool:
+        """Fingerprints that differ by more in the first word alone are not looked at further: nearly all."""
+        known = self._words[:, : self.count]
+        near = known[:, np.bitwise_count(known[0] ^ row[0]) <= self._near_bits]
+        differing = np.bitwise_count(near ^ row[:, None]).sum(0, dtype=int)
+        return bool((differing <= self._near_bits).any())
 
     def add(self, looks: np.ndarray) -> None:
         """Remember `looks` (n, 4)."""
-        while self.count + len(looks) > len(self._rows):
-            self._rows = np.concatenate([self._rows, np.empty_like(self._rows)])
-        self._rows[self.count : self.count + len(looks)] = looks
+        while self.count + len(looks) > self._words.shape[1]:
+            self._words = np.concatenate([self._words, np.empty_like(self._words)], axis=1)
+        self._words[:, self.count : self.count + len(looks)] = looks.T
         self.count += len(looks)
 
     def forget(self, count: int) -> None:
