@@ -208,6 +208,28 @@ def test_a_bar_gets_shorter_where_its_terminal_is_narrow_and_its_figures_do_not(
     assert "999/1000 99.9 pictures/s, 0:00:00 left" in capsys.readouterr().err
 
 
+def test_what_comes_after_has_a_bar_and_a_pace_of_its_own(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    clock = Clock()
+    monkeypatch.setattr(progress, "Pace", lambda: Pace(clock))
+    for is_reached in (False, True):
+        clock.now = 0.0
+        with progress.progress_bar("pairs", "pairs", quiet=False) as bar:
+            after = bar.then("checking the whole", "shards")
+            for clock.now in (0.0, 10.0):
+                bar(int(clock.now), 10)
+            if is_reached:
+                after(0, 8)
+                clock.now = 12.0
+                after(4, 8)
+        shown = capsys.readouterr().err
+        assert "10/10 1 pairs/s, 0:00:00 left" in shown
+        assert ("checking the whole" in shown) == is_reached
+        assert ("4/8 2 shards/s, 0:00:02 left" in " ".join(shown.split())) == is_reached
+
+
 @pytest.mark.parametrize("columns", ["30", "50"])
 def test_a_narrow_terminal_cuts_no_figure_of_a_table(
     columns: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

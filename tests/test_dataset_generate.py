@@ -41,7 +41,8 @@ from fsid.dataset import (
 )
 from fsid.dataset.generate import _Shard
 from fsid.dataset.sample import Sample
-from fsid.dataset.shards import read_samples
+from fsid.dataset.settle import settle
+from fsid.dataset.shards import find_shards, read_samples
 from fsid.dataset.worker import Worker
 from fsid.errors import FsidError
 from fsid.sensor import NoiseTerms, load_profile, read_raw, save_profile
@@ -143,6 +144,18 @@ def test_a_smaller_count_in_between_leaves_nothing_unfinished(photos: Path, tmp_
     assert "2 pairs for denoise" in (tmp_path / "README.md").read_text()  # what follows a gap is not settled
     assert generate(tmp_path, config, count=6, shard_size=2) == 2
     assert (tmp_path / "README.md").read_text() == card
+
+
+def test_what_is_read_again_at_the_end_has_progress(photos: Path, scenes: Path, tmp_path: Path):
+    """At 175,000 pairs that takes minutes. Pictures may look alike, so their shards are read once."""
+    told: list[tuple[int, int]] = []
+    config = small("width=64", "height=48", f"images={photos}")
+    generate(tmp_path, config, count=6, shard_size=2, finishing=lambda *now: told.append(now))
+    assert told == [(4, 6), (5, 6), (6, 6)]
+    shards = find_shards(scenes)
+    read: list[int] = []
+    settle(shards, small(), 0, lambda task: pytest.fail(f"{task} is settled already"), read.append)
+    assert read == list(range(1, len(shards) + 1))
 
 
 def test_another_seed_gives_other_pictures(scenes: Path, tmp_path: Path):

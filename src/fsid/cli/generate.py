@@ -27,6 +27,8 @@ Variant = Literal["objects", "materials", "objects-materials", "full"]
 Task = Literal["denoise", "super-resolution", "deblur", "burst"]
 RendererName = Literal["raster", "reference"]
 Quality = Literal["high", "fast"]
+_QUICKLY_READ = 100
+"""Shards, for which no further bar is shown; the records of one take a twentieth of a second."""
 
 
 def generate(
@@ -160,6 +162,12 @@ def _make(
     from fsid.dataset import generate as generate_dataset
 
     with progress_bar("pairs", "pairs", quiet=quiet) as progress:
+        reading = progress.then("checking the whole", "shards")
+
+        def finishing(done: int, total: int) -> None:
+            if total > _QUICKLY_READ:
+                reading(done, total)
+
         return generate_dataset(
             out,
             settings,
@@ -168,6 +176,7 @@ def _make(
             workforce=workforce,
             progress=progress,
             lost=progress.failed,
+            finishing=finishing,
             command=shlex.join(["fsid", *sys.argv[1:]]),
         )
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TaskID, TextColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn
 from rich.table import Column
 from rich.text import Text
 
@@ -18,12 +18,11 @@ from fsid.terminal import Terminal
 
 
 class _Speed(ProgressColumn):
-    def __init__(self, pace: Pace, unit: str) -> None:
+    def __init__(self) -> None:
         super().__init__(Column(no_wrap=True))
-        self._pace, self._unit = pace, unit
 
     def render(self, task: Task) -> Text:
-        return Text(_speed(self._pace, self._unit), style="dim")
+        return Text(_speed(task.fields["pace"], task.fields["unit"]), style="dim")
 
 
 def _speed(pace: Pace, unit: str) -> str:
@@ -33,16 +32,20 @@ def _speed(pace: Pace, unit: str) -> str:
 class Bar:
     """`bar(done, total)` moves it, and shows it at the first call; `bar.failed(line)` counts a failure."""
 
-    def __init__(self, bar: Progress, task: TaskID, unit: str, pace: Pace) -> None:
-        self._bar, self._task, self._unit, self._pace, self._failures = bar, task, unit, pace, 0
+    def __init__(self, bar: Progress, label: str, unit: str) -> None:
+        self._bar, self._label, self._unit, self._pace, self._failures = bar, label, unit, Pace(), 0
+        self._task = bar.add_task(label, False, None, visible=False, pace=self._pace, unit=unit, failures="")
+
+    def then(self, label: str, unit: str) -> Bar:
+        """Another below it, for what comes after it in the same call."""
+        return Bar(self._bar, label, unit)
 
     def __call__(self, done: int, total: int) -> None:
         self._pace.update(done, total)
+        self._bar.update(self._task, completed=done, total=total, visible=True)
         self._bar.start()
-        self._bar.update(self._task, completed=done, total=total)
         if not self._bar.console.is_terminal and self._pace.line_due():
-            label = self._bar.tasks[self._task].description
-            line = f"{label}: {done}/{total} {_speed(self._pace, self._unit)}"
+            line = f"{self._label}: {done}/{total} {_speed(self._pace, self._unit)}"
             self._bar.console.print(Text(line), soft_wrap=True)
 
     def failed(self, line: str) -> None:
@@ -55,18 +58,16 @@ class Bar:
 @contextmanager
 def progress_bar(label: str, unit: str, *, quiet: bool) -> Iterator[Bar]:
     """Yields progress(done, total), both in `unit`s, for a `with` block; the bar appears at the first."""
-    pace = Pace()
     columns = (
         TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(table_column=Column(no_wrap=True)),  # where it is narrow, the bar is shorter
-        _Speed(pace, unit),
+        _Speed(),
         TextColumn("[yellow]{task.fields[failures]}"),
     )
     bar = Progress(*columns, console=Terminal(stderr=True, quiet=quiet))
-    task = bar.add_task(label, total=None, failures="")
     try:
-        yield Bar(bar, task, unit, pace)
+        yield Bar(bar, label, unit)
     finally:
         if bar.live.is_started:
             bar.stop()

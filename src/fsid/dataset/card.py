@@ -10,7 +10,7 @@ from __future__ import annotations
 import io
 import math
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -91,13 +91,23 @@ def check_card(out: Path) -> None:
     )
 
 
-def write_card(out: Path, dataset: DatasetConfig, shards: Sequence[Path], command: str) -> None:
-    """Write README.md and samples.png of the dataset in `out`. command: what made it, "" where unknown."""
+def write_card(
+    out: Path,
+    dataset: DatasetConfig,
+    shards: Sequence[Path],
+    command: str,
+    read: Callable[[int], None] = lambda shards: None,
+) -> None:
+    """Write README.md and samples.png of the dataset in `out`. command: what made it, "" where unknown.
+
+    read(shards): called after every one.
+    """
     tally = _Tally()
-    for shard in shards:
+    for number, shard in enumerate(shards, 1):
         with records_of(shard):
             for record in read_records(shard):
                 tally.add(record)
+        read(number)
     write_atomically(out / SHEET, _sheet(shards))
     text = _text(dataset, tally, list(_statistics(out)), command)
     write_atomically(out / CARD, text.encode(errors="backslashreplace"))

@@ -118,6 +118,7 @@ def generate(
     progress: Callable[[int, int], None] = lambda done, total: None,
     workforce: Workforce | None = None,
     lost: Callable[[str], None] = lambda line: None,
+    finishing: Callable[[int, int], None] = lambda done, total: None,
     command: str = "",
 ) -> int:
     """Make the samples 0 .. count-1 that `out` lacks; returns how many were made.
@@ -126,7 +127,8 @@ def generate(
     calls this under `if __name__ == "__main__":`. shard_size: samples, a multiple of
     `config.pairs_per_frame`; 0 takes the first from SHARD_SIZE on. progress(done, total): samples, called at
     the start and after every shard. lost(line): called for every worker that died; its shard is made again by
-    another. command: for the dataset card, README.md, which is written when all samples are there.
+    another. finishing(done, total): shards that are read again when all are there, for near-duplicates and
+    for the dataset card, README.md. command: for the card.
     Raises FsidError where `out` already holds a dataset of another configuration or seed, where another
     process fills it, where the disk refuses, or where a shard kills its worker again and again.
     """
@@ -156,8 +158,9 @@ def generate(
 
         if todo or not (out / CARD).exists():
             shards = list(_unbroken(out, dataset.shard_size))
-            settle(shards, dataset.generate, dataset.seed, redraw)
-            write_card(out, dataset, shards, command)
+            both = 2 * len(shards)
+            settle(shards, dataset.generate, dataset.seed, redraw, lambda n: finishing(n, both))
+            write_card(out, dataset, shards, command, lambda n: finishing(len(shards) + n, both))
     return total
 
 

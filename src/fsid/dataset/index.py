@@ -9,13 +9,12 @@ tar file. Indexing reads tar and TIFF headers only, and where there is no config
 from __future__ import annotations
 
 import hashlib
-import re
 import tarfile
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import tifffile
@@ -23,7 +22,7 @@ import tifffile
 from fsid.config import from_plain, read_yaml
 from fsid.dataset.attempt import SAMPLE_KEY
 from fsid.dataset.config import DatasetConfig, split_of
-from fsid.dataset.shards import find_shards, open_shard, read_files, read_record
+from fsid.dataset.shards import find_shards, open_shard, read_heads
 from fsid.errors import FsidError
 from fsid.files import read_whole
 from fsid.sensor import dng_tags
@@ -34,9 +33,6 @@ from fsid.sensor.tiff import quotients
 
 _ORIGIN_KEYS = ("crops", "exposures", "noise_levels", "validation_every")
 """Settings that say which scene a sample is from; others may be those of another version of FSID."""
-
-_LONG_PART = re.compile(rb', "(scene|settings)": \{')
-"""Where in the JSON that FSID writes all is said of its origin, and 100 kB may follow that are not parsed."""
 
 MosaicKind = Literal["clean", "noisy"]
 
@@ -174,10 +170,7 @@ def _origin_by_json() -> Callable[[StoredMosaic], tuple[int, str]]:
 
     @lru_cache(maxsize=1)  # a shard's mosaics come one after the other
     def stated(shard: Path) -> dict[str, tuple[str, str]]:
-        return {
-            name.removesuffix(".json"): _stated_origin(data, f"{shard}: {name}")
-            for name, data in read_files(shard, ".json")
-        }
+        return {name.removesuffix(".json"): _stated_origin(head) for name, head in read_heads(shard)}
 
     def origin(mosaic: StoredMosaic) -> tuple[int, str]:
         scene, split = stated(mosaic.shard).get(mosaic.key, ("", "train"))
@@ -186,10 +179,8 @@ def _origin_by_json() -> Callable[[StoredMosaic], tuple[int, str]]:
     return origin
 
 
-def _stated_origin(data: bytes, where: str) -> tuple[str, str]:
+def _stated_origin(record: Mapping[str, Any]) -> tuple[str, str]:
     """What tells a sample's scene from others, "" where its JSON does not, and its split."""
-    long = _LONG_PART.search(data) if data.startswith(b'{"key": ') else None
-    record = read_record(data[: long.start()] + b"}" if long else data, where)
     of_frame = f"seed {record.get('seed')} frame {record['frame']}" if "frame" in record else ""
     return str(record.get("image", of_frame)), str(record.get("split", "train"))
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from fsid.dataset.config import GenerateConfig
 from fsid.dataset.sample import ATTEMPTS, encode, make_frame
-from fsid.dataset.shards import read_records, read_samples, records_of, write_shard
+from fsid.dataset.shards import read_heads, read_samples, records_of, write_shard
 from fsid.dataset.worker import Worker
 
 REDRAWS = ATTEMPTS // 2
@@ -101,8 +101,15 @@ class Settle:
         write_shard(path, samples.items())
 
 
-def settle(shards: Sequence[Path], config: GenerateConfig, seed: int, do: Callable[[Settle], None]) -> None:
-    """Settle the frames of all shards; `do` has a worker do a task. Not for pictures, see `Checks`."""
+def settle(
+    shards: Sequence[Path],
+    config: GenerateConfig,
+    seed: int,
+    do: Callable[[Settle], None],
+    read: Callable[[int], None] = lambda shards: None,
+) -> None:
+    """Settle the frames of all shards; `do` has a worker do a task, which settles the rest of them where one
+    has to be drawn again. read(shards): called for every shard before. Not for pictures, see `Checks`."""
     looks = Looks(config.checks.duplicate_bits)
     if config.images or config.checks.duplicate_bits < 0:
         return
@@ -110,13 +117,14 @@ def settle(shards: Sequence[Path], config: GenerateConfig, seed: int, do: Callab
         if _has_open(shard, looks):
             do(Settle(tuple(shards[number:]), config, seed, looks))
             return
+        read(number + 1)
 
 
 def _has_open(shard: Path, looks: Looks) -> bool:
     """Whether a frame of the shard has to be drawn again; if none, all are remembered."""
     before = looks.count
     with records_of(shard):
-        for frame in _frames(read_records(shard)):
+        for frame in _frames(head for _, head in read_heads(shard)):
             if frame.is_open(looks):
                 looks.forget(before)
                 return True

@@ -27,6 +27,10 @@ from fsid.files import check_file
 _PART = re.compile(r"\.shard-\d+\.tar\..+-\d+\.part|(config\.yaml|README\.md|samples\.png)(\.\d+)?\.part")
 """Names that writers give (`part_path`, `fsid.files.write_together`) and people hardly do."""
 
+_HEAD_BYTES = 16384
+_LONG_PART = re.compile(rb', "(scene|settings)": \{')
+"""Where in the JSON that FSID writes all else is said, and 200 kB may follow."""
+
 
 def shard_path(folder: str | Path, number: int) -> Path:
     """Path of shard `number`."""
@@ -143,6 +147,18 @@ def read_records(path: Path) -> Iterator[dict[str, Any]]:
         yield read_record(data, f"{path}: {name}")
 
 
+def read_heads(path: Path) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Name of every sample's JSON and its content up to scene and settings, which are not read; the whole
+    content where FSID did not write it. FsidError where it is not readable."""
+    with open_shard(path) as (tar, members):
+        for member in members:
+            if member.name.endswith(".json"):
+                head = _content(tar, member, _HEAD_BYTES)
+                long = _LONG_PART.search(head) if head.startswith(b'{"key": ') else None
+                data = head[: long.start()] + b"}" if long else _content(tar, member)
+                yield member.name, read_record(data, f"{path}: {member.name}")
+
+
 @contextmanager
 def records_of(path: Path) -> Iterator[None]:
     """FsidError where the block fails for what the records of a shard lack, or hold instead."""
@@ -177,10 +193,10 @@ def open_shard(path: Path) -> Iterator[tuple[tarfile.TarFile, Iterator[tarfile.T
         raise FsidError(f"{path}: is not a readable shard ({error}); delete it and generate again") from None
 
 
-def _content(tar: tarfile.TarFile, member: tarfile.TarInfo) -> bytes:
+def _content(tar: tarfile.TarFile, member: tarfile.TarInfo, at_most: int = -1) -> bytes:
     file = tar.extractfile(member)
     assert file is not None
-    return file.read()
+    return file.read(at_most)
 
 
 def _members(path: str | Path) -> list[str]:
