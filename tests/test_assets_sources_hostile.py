@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import os
+import re
 import resource
 import struct
 import time
@@ -17,6 +18,7 @@ import trimesh
 
 from fsid.assets.sources import mesh_sources, survey_meshes
 from fsid.assets.sources.catalogue import CATALOGUE
+from fsid.assets.sources.limits import MAX_JSON_VALUES, MAX_LICENCE_LETTERS, MAX_LINES
 from fsid.assets.survey import KNOWN
 
 GOOD = trimesh.creation.box((0.2, 0.3, 0.4))
@@ -211,6 +213,44 @@ def test_a_catalogue_bomb_is_not_unpacked(tmp_path: Path):
     with zipfile.ZipFile(tmp_path / "bomb.sh3f", "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr(CATALOGUE, b"\n" * (20 * 2**20))
     assert "unpacks to" in refused(tmp_path)
+
+
+def test_a_library_of_more_models_than_any_has_is_not_looked_through(tmp_path: Path):
+    """100 kB that name 20,000 models which are not there left as many files in the cache."""
+    library(tmp_path / "x.sh3f", "".join(f"model#{i}=a{i}\n" for i in range(10_001)), {})
+    assert "10,001 models" in refused(tmp_path)
+
+
+def test_a_long_licence_takes_no_time(tmp_path: Path):
+    """A zip of 1 kB took a minute to tell whether its licence is CC0, and one of 2 kB four times as long."""
+    catalogue = f"model#1=a.obj\nlicense=CC0 {'attribution ' * 40_000}\n"
+    library(tmp_path / "x.sh3f", catalogue, {"a.obj": GOOD.export(file_type="obj").encode()})
+    (source,) = survey_meshes(str(tmp_path), cc0_only=True).usable
+    assert len(source.licence) == MAX_LICENCE_LETTERS
+
+
+_PLY = (
+    b"element vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n"
+    b"property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
+)
+SWELLING = {
+    "empty lines": ("a.ply", b"ply\nformat ascii 1.0\n" + _PLY + b"\n" * MAX_LINES, "lines"),
+    "empty lines of another kind": (
+        "a.ply",
+        b"ply\r\nformat ASCII 1.0\r\n" + _PLY + b"\f" * MAX_LINES,
+        "lines",
+    ),
+    "solids": ("a.stl", b"solid\nfacet\nendsolid\n" * 5_001, "solids"),
+    "values": ("a.gltf", b'{"x":[' + b"{}," * MAX_JSON_VALUES + b"{},0]}", "values"),
+}
+
+
+@pytest.mark.parametrize("case", SWELLING)
+def test_text_that_swells_as_it_is_read_is_refused(tmp_path: Path, case: str):
+    """A line became an array and an empty pair of braces a dict: zips of 16 and 245 kB took 3 and 6 GB."""
+    name, content, reason = SWELLING[case]
+    library(tmp_path / "x.sh3f", f"model#1={name}\n", {name: content})
+    assert re.search(f"more than [0-9,]+ {reason}", refused(tmp_path))
 
 
 def test_a_catalogue_of_blanks_takes_no_time(tmp_path: Path):

@@ -22,6 +22,8 @@ from fsid.assets.sources.limits import (
     MAX_CATALOGUE_BYTES,
     MAX_DIRECTORY_BYTES,
     MAX_FILE_BYTES,
+    MAX_LICENCE_LETTERS,
+    MAX_MODELS,
     NotNowError,
     RefusedError,
 )
@@ -53,6 +55,8 @@ def read_catalogue(path: Path) -> tuple[Entry, ...]:
         lines = text.replace("\r\n", "\n").replace("\r", "\n")
         values = {key: _unescaped(value.strip(" \t")) for key, value in _LINE.findall(lines)}
         numbers = [key.partition("#")[2] for key in values if key.startswith("model#")]
+        if len(numbers) > MAX_MODELS:
+            raise RefusedError(f"{len(numbers):,} models; at most {MAX_MODELS:,} are read")
         return tuple(_entry(values, number, archive) for number in numbers)
 
 
@@ -111,7 +115,7 @@ def _entry(values: dict[str, str], number: str, archive: zipfile.ZipFile) -> Ent
     rotation = _floats(values.get(f"modelRotation#{number}", ""), 9)
     return Entry(
         member=member,
-        licence=shown(values.get(f"license#{number}", values.get("license", ""))),
+        licence=shown(values.get(f"license#{number}", values.get("license", ""))[:MAX_LICENCE_LETTERS]),
         size_m=None if sides is None or not (sides > 0).all() else np.clip(sides / 100, 1e-4, 1e3),
         rotation=np.eye(3) if rotation is None else rotation.reshape(3, 3),
         present=member in archive.NameToInfo,

@@ -17,7 +17,14 @@ from typing import Any
 
 import numpy as np
 
-from fsid.assets.sources.limits import MAX_DEPTH, MAX_FILE_BYTES, MAX_NODES, MAX_TRIANGLES, RefusedError
+from fsid.assets.sources.limits import (
+    MAX_DEPTH,
+    MAX_FILE_BYTES,
+    MAX_JSON_VALUES,
+    MAX_NODES,
+    MAX_TRIANGLES,
+    RefusedError,
+)
 
 Fetch = Callable[[str], bytes]
 """Relative name -> content; raises RefusedError."""
@@ -60,14 +67,20 @@ def referred(data: bytes) -> list[str]:
 def _split(data: bytes) -> tuple[dict[str, Any], bytes | None]:
     """The JSON document and the binary chunk of a .glb; of a .gltf there is only the first."""
     if data[:4] != b"glTF":
-        return json.loads(data.decode("utf-8-sig")), None
+        return _document(data.removeprefix(b"\xef\xbb\xbf")), None
     chunks: dict[int, bytes] = {}
     at = 12
     while at + 8 <= len(data):
         length, kind = struct.unpack_from("<II", data, at)
         chunks.setdefault(kind, data[at + 8 : at + 8 + length])
         at += 8 + length
-    return json.loads(chunks[_JSON].decode("utf-8")), chunks.get(_BIN)
+    return _document(chunks[_JSON]), chunks.get(_BIN)
+
+
+def _document(text: bytes) -> dict[str, Any]:
+    if text.count(b",") > MAX_JSON_VALUES:
+        raise RefusedError(f"more than {MAX_JSON_VALUES:,} values in its JSON")
+    return json.loads(text.decode("utf-8"))
 
 
 def _buffers(document: dict[str, Any], binary: bytes | None, fetch: Fetch) -> dict[str, bytes]:

@@ -33,7 +33,7 @@ from fsid.assets.sources.cache import (
 from fsid.assets.sources.catalogue import Entry, read_catalogue, read_member
 from fsid.assets.sources.cleaning import Triangles, clean
 from fsid.assets.sources.gltf_file import referred
-from fsid.assets.sources.limits import MAX_FILE_BYTES, NotNowError, RefusedError
+from fsid.assets.sources.limits import MAX_FILE_BYTES, MAX_LICENCE_LETTERS, NotNowError, RefusedError
 from fsid.assets.sources.reading import MESH_SUFFIXES, read_triangles
 from fsid.assets.survey import Skipped, Survey, surveyed
 from fsid.errors import FsidError
@@ -44,7 +44,7 @@ PREFIX = "file:"
 LIBRARY_SUFFIX = ".sh3f"
 _CC0 = re.compile(r"\bcc[ -]?(?:0|zero)\b|public[ -]domain|creativecommons\.org/publicdomain", re.IGNORECASE)
 _ATTRIBUTION = re.compile(
-    r"\bcc[ -]by\b|\battribution\b[\w -]* \d\.\d|creativecommons\.org/licenses/", re.IGNORECASE
+    r"\bcc[ -]by\b|\battribution\b[\w -]{0,80} \d\.\d|creativecommons\.org/licenses/", re.IGNORECASE
 )
 _LICENCE_FILES = re.compile(r"(?:licen[cs]e|copying|cc0)\b.*|.*licen[cs]e\.txt", re.IGNORECASE)
 _SIZES_M = (0.01, 20.0)
@@ -185,7 +185,7 @@ def _licence_beside(folder: Path, root: Path) -> str:
         if _LICENCE_FILES.fullmatch(name) and (folder / name).is_file():
             try:
                 with (folder / name).open(encoding="utf-8", errors="replace") as file:
-                    text = file.read(20_000)
+                    text = file.read(MAX_LICENCE_LETTERS)
             except OSError:
                 return ""
             first = next((line.strip() for line in text.splitlines() if line.strip()), "")

@@ -15,6 +15,10 @@ MAX_DIRECTORY_BYTES = 32 * 2**20
 """Of the directory at a zip's end: some 300,000 members."""
 
 MAX_CATALOGUE_BYTES = 16 * 2**20
+MAX_MODELS = 10_000
+"""Of a library; each that cannot be read leaves a file in the cache."""
+
+MAX_LICENCE_LETTERS = 20_000
 MAX_TRIANGLES = 4_000_000
 """As read. What is kept is `cleaning.KEPT_TRIANGLES`."""
 
@@ -24,6 +28,9 @@ MAX_PARTS = 5_000
 MAX_LINE_BYTES = 16 * 2**20
 """Of an OBJ."""
 
+MAX_LINES = 6_000_000
+"""Of an ASCII PLY, some 400 bytes of memory each."""
+
 MAX_EAR_WORK = 10**8
 """Corners looked through to divide the concave faces of a mesh."""
 
@@ -32,6 +39,9 @@ NO_VERTEX = "a face that names a vertex which does not exist"
 MAX_NODES = 5_000
 MAX_DEPTH = 200
 """Of a glTF scene graph."""
+
+MAX_JSON_VALUES = 4_000_000
+"""Of a glTF document, which is told by its commas; up to some 80 bytes of memory each."""
 
 
 class RefusedError(Exception):

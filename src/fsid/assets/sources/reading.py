@@ -12,7 +12,15 @@ import numpy as np
 
 from fsid.assets.sources.cleaning import Triangles
 from fsid.assets.sources.gltf_file import Fetch, plain_gltf
-from fsid.assets.sources.limits import MAX_FILE_BYTES, MAX_TRIANGLES, NO_VERTEX, NotNowError, RefusedError
+from fsid.assets.sources.limits import (
+    MAX_FILE_BYTES,
+    MAX_LINES,
+    MAX_PARTS,
+    MAX_TRIANGLES,
+    NO_VERTEX,
+    NotNowError,
+    RefusedError,
+)
 from fsid.assets.sources.obj_file import read_obj
 
 MESH_SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl")
@@ -53,6 +61,8 @@ def _geometries(data: bytes, suffix: str, fetch: Fetch) -> list[tuple[str, np.nd
         suffix = ".gltf"
     elif suffix == ".ply":
         _check_ply(data)
+    elif suffix == ".stl" and data.lower().count(b"endsolid") > MAX_PARTS:
+        raise RefusedError(f"more than {MAX_PARTS:,} solids")
     loaded = trimesh.load_scene(io.BytesIO(data), suffix[1:], resolver=resolver, process=False)
     pieces = []
     for node in loaded.graph.nodes_geometry:
@@ -66,13 +76,20 @@ def _geometries(data: bytes, suffix: str, fetch: Fetch) -> list[tuple[str, np.nd
 
 
 def _check_ply(data: bytes) -> None:
-    """Elements stated in the header must fit into the file: none takes less than a byte."""
+    """Elements stated in the header must fit into the file: none takes less than a byte. As text, each line
+    becomes an array, wherever Python's `splitlines` ends one."""
     header = data[: data.find(b"end_header")]
     if len(header) > 100_000:
         raise RefusedError("a header without end")
     for count in re.findall(rb"^element\s+\S+\s+(\S+)", header, re.MULTILINE):
         if not count.isdigit() or len(count) > 18 or int(count) > min(len(data), 3 * MAX_TRIANGLES):
             raise RefusedError(f"{count.decode('latin-1')[:20]} elements in a file of {len(data):,} bytes")
+    second = data.find(b"\n") + 1
+    if b"ascii" in data[second : data.find(b"\n", second)].lower():
+        body = data[len(header) :]
+        lines = len(body) - len(body.translate(None, b"\n\r\v\f\x1c\x1d\x1e"))
+        if lines > MAX_LINES or not body.isascii():
+            raise RefusedError(f"more than {MAX_LINES:,} lines, or letters among its numbers")
 
 
 def _joined(pieces: list[tuple[str, np.ndarray, np.ndarray]]) -> Triangles:
