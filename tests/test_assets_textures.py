@@ -141,6 +141,28 @@ def test_the_alpha_of_a_grey_exr_is_not_its_map(tmp_path):
     np.testing.assert_allclose(bake_material(f"file:{tmp_path}", 0, 64).roughness, 0.25, atol=0.01)
 
 
+def test_an_exr_whose_other_channels_and_parts_would_fill_memory_is_left_out(tmp_path, monkeypatch):
+    """A file of 7 MB had channels of 7 GB, and what it is read for is decoded with all of them."""
+    import OpenEXR
+
+    monkeypatch.setattr(files, "MAX_PIXELS", SIZE * SIZE)
+    grey = np.full((SIZE, SIZE), 0.5, np.float32)
+    for name in ("channels", "parts"):
+        save(tmp_path / f"{name}_diff_1k.jpg", picture())
+    header = {"type": OpenEXR.scanlineimage}
+    planes = dict.fromkeys("RGBAZ", grey)
+    OpenEXR.File(header, planes).write(str(tmp_path / "channels_rough_1k.exr"))
+    parts = [
+        OpenEXR.Part(header | {"name": "map"}, {"Y": grey}),
+        OpenEXR.Part(header | {"name": "rest"}, dict.fromkeys("RGBA", grey)),
+    ]
+    OpenEXR.File(parts).write(str(tmp_path / "parts_rough_1k.exr"))
+    with pytest.raises(
+        FsidError, match=r"first of 2 skipped: channels_rough_1k\.exr has 81,920 values in all"
+    ):
+        survey_textures(str(tmp_path))
+
+
 def test_an_exr_that_is_no_map_is_left_out(tmp_path, monkeypatch):
     monkeypatch.setattr(files, "MAX_PIXELS", SIZE * SIZE)
     grey = np.full((SIZE, SIZE), 0.5)

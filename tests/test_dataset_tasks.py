@@ -17,7 +17,7 @@ from PIL import ExifTags, Image, ImageCms, ImageOps
 from scipy.ndimage import gaussian_filter, map_coordinates
 
 from fsid.config import given_keys, load_settings
-from fsid.dataset import GenerateConfig, Sample, check_given, encode, make_sample, read_photo
+from fsid.dataset import GenerateConfig, Sample, check_given, encode, make_sample, pictures, read_photo
 from fsid.dataset.attempt import _half_precision
 from fsid.dataset.given import _FIXED, _NEEDS
 from fsid.dataset.pictures import check_pictures, find_pictures, read_exr
@@ -220,6 +220,13 @@ def write_layers(path: Path, layers: dict[str, str], in_parts: bool) -> None:
     else:
         file = openexr.File(header, {name: pixels for part in parts for name, pixels in part.items()})
     file.write(str(path))
+
+
+def test_layers_that_would_fill_memory_are_not_decoded(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr(pictures, "_MOST_VALUES", 6 * 64 * 96 - 1)
+    write_layers(tmp_path / "render.exr", {"": "RGB", "rest": "XYZ"}, in_parts=True)
+    with pytest.raises(FsidError, match=r"render\.exr: has 36,864 values in all its layers"):
+        read_exr(tmp_path / "render.exr")
 
 
 @pytest.mark.parametrize("in_parts", [False, True], ids=["one part", "a part per layer"])

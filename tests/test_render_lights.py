@@ -637,10 +637,17 @@ def test_the_size_of_an_exr_sky_is_checked_before_it_is_decoded(tmp_path, monkey
         panorama(Sky(f"file:{tmp_path / 'sky.exr'}", ONE))
 
 
-def write_exr(path, light: np.ndarray) -> None:
+def test_an_exr_sky_with_channels_that_would_fill_memory_is_left_out(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(fsid.assets.skies, "_MOST_EXR_VALUES", 4 * 32 * 16)
+    write_exr(tmp_path / "sky.exr", np.ones((16, 32, 5), np.float32), "RGBAZ")
+    with pytest.raises(FsidError, match="2,560 values in all its channels and parts; keep R, G and B alone"):
+        survey_skies(str(tmp_path))
+
+
+def write_exr(path, light: np.ndarray, names: str = "RGB") -> None:
     import OpenEXR
 
-    channels = {c: np.ascontiguousarray(light[..., i]) for i, c in enumerate("RGB")}
+    channels = {c: np.ascontiguousarray(light[..., i]) for i, c in enumerate(names)}
     with OpenEXR.File({"type": OpenEXR.scanlineimage}, channels) as file:
         file.write(str(path))
 

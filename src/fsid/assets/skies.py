@@ -12,7 +12,7 @@ import os
 import re
 from pathlib import Path
 
-from fsid.assets.exr import stated_size
+from fsid.assets.exr import stated_size, stated_values
 from fsid.assets.file_names import NOT_TEXT, shown
 from fsid.assets.survey import Skipped, Survey, surveyed
 from fsid.errors import FsidError
@@ -21,6 +21,7 @@ SKY_SUFFIXES = (".hdr", ".exr")
 XYZE = b"FORMAT=32-bit_rle_xyze"
 """In the header of a Radiance picture whose numbers are CIE XYZ."""
 _LEAST_HEIGHT_PX, _MOST_HEIGHT_PX = 16, 16384
+_MOST_EXR_VALUES = 4 * 2 * _MOST_HEIGHT_PX**2
 _HEADER_BYTES = 65536
 _RADIANCE = re.compile(rb"#\?.*?\n\n-Y (\d{1,6}) \+X (\d{1,6})\n", re.DOTALL)
 
@@ -87,11 +88,15 @@ def _radiance_size(path: Path) -> tuple[int, int] | None:
 def exr_size(path: Path) -> tuple[int, int] | None:
     """(width, height) of the first part of a .exr, as its header states it; None where it has no R, G and B.
 
-    Raises what OpenEXR does (OSError, RuntimeError, ValueError, KeyError, TypeError) for what is none.
+    ValueError where all parts and channels, which are decoded together, are more than R, G, B and A of the
+    largest panorama. Raises what OpenEXR does (OSError, RuntimeError, ValueError, KeyError, TypeError) for
+    what is none.
     """
     import OpenEXR  # only users of such files need it
 
     with OpenEXR.File(str(path), header_only=True) as file:
         header = file.header()
+        if (values := stated_values(file)) > _MOST_EXR_VALUES:
+            raise ValueError(f"{values:,} values in all its channels and parts; keep R, G and B alone")
         names = {channel.name for channel in header["channels"]}
         return stated_size(header) if {"R", "G", "B"} <= names else None

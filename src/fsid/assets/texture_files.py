@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, UnidentifiedImageError
 
-from fsid.assets.exr import stated_size
+from fsid.assets.exr import stated_size, stated_values
 
 MAX_FILE_BYTES = 128 * 2**20
 MAX_PIXELS = 8192 * 8192
@@ -153,8 +153,10 @@ def decode_exr(path: Path) -> np.ndarray:
 
     try:
         with OpenEXR.File(str(path), header_only=True) as file:
-            width, height = stated_size(file.header())
+            (width, height), values = stated_size(file.header()), stated_values(file)
         _check_size(path.name, width, height)
+        if values > 4 * MAX_PIXELS:
+            raise RefusedImageError(f"{path.name} has {values:,} values in all its channels and parts")
         with OpenEXR.File(str(path), separate_channels=True) as file:
             channels = {name: channel.pixels for name, channel in file.channels().items()}
         grey = sorted(channels, key=lambda name: (name.rpartition(".")[2] == "A", name))[:1]

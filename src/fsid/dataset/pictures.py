@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fsid.assets.exr import stated_size
+from fsid.assets.exr import stated_size, stated_values
 from fsid.counted import counted
 from fsid.dataset.photos import (
     PHOTO_SUFFIXES,
@@ -33,6 +33,8 @@ EXR_SUFFIX = ".exr"
 _SRGB_CHROMATICITIES = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
 _MOST_PX = 2**27
 """Of a render; about as many as Pillow takes of a photograph."""
+_MOST_VALUES = 4 * _MOST_PX
+"""Of all layers, which are decoded together: 2 GiB."""
 _BEAUTY = "Combined"
 """Blender's name of the layer that holds all light."""
 
@@ -127,10 +129,14 @@ def read_exr(path: Path, smallest_px: int = SMALLEST_PX) -> np.ndarray:
     check_file(path)
     try:
         with OpenEXR.File(str(path), header_only=True) as file:  # before anything is decoded
-            sizes = [stated_size(part.header) for part in file.parts]
+            sizes, values = [stated_size(part.header) for part in file.parts], stated_values(file)
         for width, height in sizes:
             if width * height > _MOST_PX:
                 raise FsidError(f"{path}: is {width}x{height} pixels, more than {_MOST_PX >> 20} million")
+        if values > _MOST_VALUES:
+            raise FsidError(
+                f"{path}: has {values:,} values in all its layers; write the one of the light alone"
+            )
         with OpenEXR.File(str(path), separate_channels=True) as file:
             parts = [{name: c.pixels for name, c in part.channels.items()} for part in file.parts]
             chromaticities = file.header().get("chromaticities", _SRGB_CHROMATICITIES)
