@@ -23,6 +23,16 @@ def test_what_is_written_is_read(tmp_path: Path):
     assert read_member(path, "a.clean.dng") == b"22"
 
 
+@pytest.mark.parametrize("kind", [tarfile.XHDTYPE, tarfile.XGLTYPE, tarfile.GNUTYPE_LONGNAME])
+def test_a_header_that_states_more_than_memory_holds_is_refused(tmp_path: Path, kind: bytes):
+    member = tarfile.TarInfo("x")
+    member.type, member.size = kind, 10**15
+    path = shard_path(tmp_path, 0)
+    path.write_bytes(member.tobuf(tarfile.GNU_FORMAT) + bytes(1024))
+    with pytest.raises(FsidError, match=r"shard-00000\.tar: is not a readable shard \(a header"):
+        shard_keys(path)
+
+
 def test_shards_come_in_the_order_of_their_numbers(tmp_path: Path):
     """Names have five digits, and more from 100,000 on; sets put together have another number before."""
     ordered = ["shard-0-00000.tar", "shard-2-00000.tar", "shard-10-00000.tar", "shard-00011.tar"]

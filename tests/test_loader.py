@@ -9,6 +9,7 @@ import os
 import re
 import shutil
 import signal
+import struct
 import sys
 import tarfile
 import time
@@ -345,6 +346,18 @@ def test_unusable_datasets_are_named(dataset: Path, tmp_path: Path) -> None:
     shard = shard_path(dataset, 0)
     shard.write_bytes(shard.read_bytes()[:5000])
     with pytest.raises(FsidError, match=r"shard-00000\.tar"):
+        index_mosaics(dataset)
+
+
+@pytest.mark.parametrize(("kind", "offset"), [("<f", 264.0), ("<i", -264)])
+def test_pixels_at_no_place_of_the_file_are_refused(kind: str, offset: float, dataset: Path) -> None:
+    """A fraction was a traceback when the pixels were asked for, in training too."""
+    shard = shard_path(dataset, 0)
+    data = bytearray(shard.read_bytes())
+    at = data.index(struct.pack("<HHI", 273, 4, 1))  # StripOffsets, LONG
+    data[at + 2 : at + 12] = struct.pack("<HI", {"<f": 11, "<i": 9}[kind], 1) + struct.pack(kind, offset)
+    shard.write_bytes(data)
+    with pytest.raises(FsidError, match=r"shard-00000\.tar: 00000000\.clean\.dng is (not a DNG|truncated)"):
         index_mosaics(dataset)
 
 

@@ -9,6 +9,7 @@ tar file. Indexing reads tar and TIFF headers only, and where there is no config
 from __future__ import annotations
 
 import hashlib
+import operator
 import tarfile
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
@@ -200,9 +201,9 @@ def _read_header(shard: Path, member: tarfile.TarInfo, key: str) -> StoredMosaic
             mosaic = StoredMosaic(
                 shard=shard,
                 key=key,
-                offset=member.offset_data + page.dataoffsets[0],
-                height=page.imagelength,
-                width=page.imagewidth,
+                offset=member.offset_data + operator.index(page.dataoffsets[0]),
+                height=operator.index(page.imagelength),
+                width=operator.index(page.imagewidth),
                 cfa=check_cfa("".join("RGB"[colour] for colour in bytes(tags[dng_tags.CFA_PATTERN])), where),
                 black_level=_level(page.tags[dng_tags.BLACK_LEVEL]),
                 white_level=_level(page.tags[dng_tags.WHITE_LEVEL]),
@@ -218,6 +219,7 @@ def _read_header(shard: Path, member: tarfile.TarInfo, key: str) -> StoredMosaic
         ValueError,
         TypeError,
         OverflowError,
+        MemoryError,
         StopIteration,
     ) as error:
         raise FsidError(
@@ -233,7 +235,8 @@ def _read_header(shard: Path, member: tarfile.TarInfo, key: str) -> StoredMosaic
             "rewrite it with read_raw and write_dng"
         )
     check_levels(mosaic.black_level, mosaic.white_level, where)
-    if mosaic.offset + 2 * mosaic.height * mosaic.width > member.offset_data + member.size:
+    end = mosaic.offset + 2 * mosaic.height * mosaic.width
+    if not member.offset_data <= mosaic.offset <= end <= member.offset_data + member.size:
         raise FsidError(f"{where} is truncated; delete the shard and generate again")
     return mosaic
 

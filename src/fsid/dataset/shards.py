@@ -189,8 +189,9 @@ def open_shard(path: Path) -> Iterator[tuple[tarfile.TarFile, Iterator[tarfile.T
     try:
         with tarfile.open(path, "r:") as tar:
             yield tar, (member for member in tar if member.isreg() and not member.issparse())
-    except (OSError, tarfile.TarError, ValueError, OverflowError, RecursionError) as error:
-        raise FsidError(f"{path}: is not a readable shard ({error}); delete it and generate again") from None
+    except (OSError, tarfile.TarError, ValueError, OverflowError, RecursionError, MemoryError) as error:
+        reason = str(error) or "a header states a size that no memory holds"
+        raise FsidError(f"{path}: is not a readable shard ({reason}); delete it and generate again") from None
 
 
 def _content(tar: tarfile.TarFile, member: tarfile.TarInfo, at_most: int = -1) -> bytes:
