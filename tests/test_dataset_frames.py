@@ -92,6 +92,24 @@ def test_an_incomplete_record_is_refused() -> None:
         remake({key: value for key, value in record.items() if key != "settings"}, Painter())
 
 
+@pytest.mark.parametrize("noise", ["x", [1, 2], [[]], 10**400, None])
+def test_a_record_whose_noise_is_none_is_refused(noise: object) -> None:
+    record = make_sample(config(), 1, 0, Painter()).record
+    with pytest.raises(FsidError, match=r"k: .* is not that of four sites"):
+        remake({**record, "k": noise}, Painter())
+
+
+def test_a_broken_record_behind_a_near_duplicate_is_named(tmp_path: Path) -> None:
+    """It was met where the shard is made again, which had not looked at it before."""
+    samples = [make_sample(config(), 1, i, Painter()) for i in (0, 0, 1)]
+    files = [(f"{i:08d}", encode(sample)) for i, sample in enumerate(samples)]
+    files[1][1]["json"] = json.dumps(samples[1].record | {"frame": 1, "index": 1}).encode()
+    files[2][1]["json"] = b"{"
+    write_shard(shard_path(tmp_path, 0), files)
+    with pytest.raises(FsidError, match=r"shard-00000\.tar: 00000002\.json: is not valid JSON"):
+        settle([shard_path(tmp_path, 0)], config(), 1, lambda task: task.do(PaintingWorker()))
+
+
 def test_frames_that_never_pass_are_one_line() -> None:
     with pytest.raises(FsidError, match=r"frame 0: 8 attempts were refused \(not finite"):
         make_frame(config(), 0, 0, Painter(bad=100))

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import io
+import json
+import shutil
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,11 +14,11 @@ import pytest
 import rawpy
 from PIL import Image
 
-from fsid.config import load_settings
-from fsid.dataset import GenerateConfig, generate, shard_path
-from fsid.dataset.card import _sources, _Tally
+from fsid.config import from_plain, load_settings, read_yaml
+from fsid.dataset import DatasetConfig, GenerateConfig, generate, shard_path, write_shard
+from fsid.dataset.card import _listed, _sources, _Tally
 from fsid.dataset.inspect import inspect
-from fsid.dataset.shards import read_records
+from fsid.dataset.shards import read_records, read_samples
 from fsid.dataset.statistics import TITLES
 from fsid.errors import FsidError
 
@@ -131,6 +134,56 @@ def test_the_card_counts_pictures_once_and_has_nothing_of_scenes_where_there_are
     assert "5 pairs for denoise, 32 x 32 pixels at most, from 2 pictures (fsid" in card
     assert "| variant |" not in card
     assert "| backgrounds |" not in card
+
+
+def with_changes(data: Path, out: Path, extension: str, changed: Callable[[bytes], bytes]) -> Path:
+    """A copy of a dataset without its card; its first shard's files of that kind are changed."""
+    shutil.copytree(data, out)
+    (out / "README.md").unlink()
+    shard = shard_path(out, 0)
+    samples = read_samples(shard)
+    for files in samples.values():
+        files[extension] = changed(files[extension])
+    write_shard(shard, samples.items())
+    return out
+
+
+def again(out: Path) -> None:
+    same = from_plain(DatasetConfig, read_yaml(out / "config.yaml"), source="config.yaml").generate
+    generate(out, same, count=6, seed=2, shard_size=4)
+
+
+@pytest.mark.parametrize(
+    "preview", [b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 9 9\n", b"\x89PNG\r\n\x1a\n"]
+)
+def test_a_preview_that_is_none_is_named(data: Path, tmp_path: Path, preview: bytes) -> None:
+    """Pillow would have Ghostscript run PostScript, and what it cannot read was a traceback."""
+    out = with_changes(data, tmp_path / "data", "rgb.png", lambda _: preview)
+    with pytest.raises(FsidError, match=r"shard-00000\.tar: 00000000\.rgb\.png: is no readable PNG"):
+        again(out)
+
+
+@pytest.mark.parametrize("change", [{"iso": 10**400}, {"frame": []}, {"refused": 3}, {"camera": None}])
+def test_records_that_say_anything_end_no_card_in_a_traceback(
+    data: Path, tmp_path: Path, change: dict[str, object]
+) -> None:
+    def changed(record: bytes) -> bytes:
+        return json.dumps(json.loads(record) | change).encode()
+
+    out = with_changes(data, tmp_path / "data", "json", changed)
+    if "camera" in change:  # beside cameras that are texts
+        again(out)
+        assert "None (4)" in (out / "README.md").read_text()
+        return
+    with pytest.raises(FsidError, match=r"shard-00000\.tar: the JSON of a sample is not of fsid generate"):
+        again(out)
+
+
+def test_the_card_shows_what_others_wrote_as_text() -> None:
+    """A licence or a camera's name may hold HTML, links and line ends."""
+    names = Counter(["<img src=x>", "[a](javascript:b)", "c\n# d", "phone_6+dirt"])
+    shown = _listed(names, "uses")
+    assert shown == r"\<img src=x> (1), \[a](javascript:b) (1), c # d (1), phone_6+dirt (1) uses"
 
 
 def test_licences_of_meshes_are_counted_by_use(tmp_path: Path) -> None:

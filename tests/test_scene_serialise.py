@@ -51,7 +51,9 @@ def test_a_missing_key_is_named(data):
         scene_from_json(json.dumps(data))
 
 
-@pytest.mark.parametrize("value", ["12", None, [1.0, 2.0], [1.0, 2.0, "x"], [1.0, 2.0, float("nan")], True])
+@pytest.mark.parametrize(
+    "value", ["12", None, [1.0, 2.0], [1.0, 2.0, "x"], [1.0, 2.0, float("nan")], [0, 0, 10**400], True]
+)
 def test_a_value_of_the_wrong_kind_is_named(data, value):
     data["transforms"][0]["position_m"] = value
     with pytest.raises(FsidError, match=r"scene\.transforms\[0\]\.position_m"):

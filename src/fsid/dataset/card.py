@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import math
+import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
@@ -23,8 +24,8 @@ from fsid.assets.sources import survey_meshes
 from fsid.counted import counted
 from fsid.dataset.config import DatasetConfig
 from fsid.dataset.index import index_mosaics
-from fsid.dataset.picture import grid
-from fsid.dataset.shards import read_member, read_records, records_of, shard_keys
+from fsid.dataset.picture import grid, stored_preview
+from fsid.dataset.shards import read_records, records_of, shard_keys
 from fsid.errors import FsidError
 from fsid.files import check_file, write_atomically
 
@@ -70,8 +71,8 @@ class _Tally:
         if scene.get("sky"):
             self._count("sky", scene["sky"]["source"])
 
-    def _count(self, what: str, which: str) -> None:
-        self.counts.setdefault(what, Counter())[which] += 1
+    def _count(self, what: str, which: Any) -> None:
+        self.counts.setdefault(what, Counter())[str(which)] += 1
 
 
 def check_card(out: Path) -> None:
@@ -160,7 +161,8 @@ def _sources(tally: _Tally) -> Iterable[str]:
         if own:
             yield f"- FSID's own {name} (Apache-2.0, made by formula): {_listed(own, 'uses')}."
         for folder, n in sorted(Counter(_folder(key) for key in (used - own).elements()).items()):
-            yield f"- {name} from `{folder}`: {counted(n, 'use')}. {_licence(what, Path(folder), used)}"
+            place = " ".join(folder.replace("`", "'").split())
+            yield f"- {name} from `{place}`: {counted(n, 'use')}. {_licence(what, Path(folder), used)}"
     pictures = tally.counts.get("picture", Counter())
     if pictures:
         number = counted(len(pictures), "picture")
@@ -205,15 +207,21 @@ def _folder_licence(folder: Path) -> str:
                 if file.is_file() and file.stem.lower() in ("license", "licence", "copying"):
                     with file.open(encoding="utf-8", errors="replace") as text:
                         first = text.read(_LICENCE_LETTERS).strip().partition("\n")[0]
-                    return f"`{file.name}`: {first[:200]}"
+                    return f"`{file.name}`: {_plain(first[:200])}"
     return "No licence file was found with them: look at their source before you publish."
 
 
 def _listed(counts: Counter[str], unit: str) -> str:
     most = counts.most_common(_FAMILIES_SHOWN)
     rest = len(counts) - len(most)
-    text = ", ".join(f"{name} ({n})" for name, n in sorted(most, key=lambda item: (-item[1], item[0])))
+    in_order = sorted(most, key=lambda item: (-item[1], item[0]))
+    text = ", ".join(f"{_plain(name)} ({n})" for name, n in in_order)
     return f"{text or 'none'}{f' and {rest} more' if rest else ''}" + (f" {unit}" if counts else "")
+
+
+def _plain(text: str) -> str:
+    """`text` of others, as a licence or a camera's name is, without what Markdown would make of it."""
+    return re.sub(r"[<`\[|\\]", r"\\\g<0>", " ".join(text.split()))
 
 
 def _sheet(shards: Sequence[Path]) -> bytes:
@@ -223,7 +231,7 @@ def _sheet(shards: Sequence[Path]) -> bytes:
     for shard in shards[::step]:
         keys = shard_keys(shard)
         for key in keys[:: max(1, len(keys) * len(shards[::step]) // _TILES)]:
-            image = Image.open(io.BytesIO(read_member(shard, f"{key}.rgb.png")))
+            image = stored_preview(shard, key)
             image.thumbnail((_TILE_PX, _TILE_PX))
             tiles.append(np.asarray(image))
     file = io.BytesIO()

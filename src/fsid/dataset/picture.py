@@ -12,6 +12,7 @@ from PIL import Image
 
 from fsid.dataset.config import GenerateConfig
 from fsid.dataset.sample import make_sample, to_uint8
+from fsid.dataset.shards import read_member
 from fsid.dataset.worker import rendering
 from fsid.errors import FsidError, whole
 from fsid.files import check_output, write_atomically
@@ -71,6 +72,17 @@ def contact_sheet(
 def _half(image: np.ndarray) -> np.ndarray:
     """(2h, 2w, C) to (h, w, C) by averaging."""
     return np.asarray(image.reshape(len(image) // 2, 2, -1, 2, image.shape[2]).mean((1, 3)))
+
+
+def stored_preview(shard: Path, key: str) -> Image.Image:
+    """The preview of a sample, RGB. FsidError where it is no PNG, whatever else Pillow might make of it."""
+    name = f"{key}.rgb.png"
+    try:
+        return Image.open(io.BytesIO(read_member(shard, name)), formats=("PNG",)).convert("RGB")
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+        raise FsidError(
+            f"{shard}: {name}: is no readable PNG ({error}); delete it and generate again"
+        ) from None
 
 
 def grid(tiles: Iterable[np.ndarray]) -> np.ndarray:

@@ -103,7 +103,11 @@ def remake(record: dict[str, Any], renderer: SceneRenderer | None) -> Sample:
 def _check_same_noise(made: dict[str, Any], record: dict[str, Any]) -> None:
     """FsidError where the profile says another noise now than `record`; the ISO is drawn, and stays."""
     for key in ("k", "sigma2"):
-        if key in record and not np.allclose(made[key], record[key], rtol=_SAME_NOISE, atol=0):
+        try:
+            is_same = key not in record or np.allclose(made[key], record[key], rtol=_SAME_NOISE, atol=0)
+        except (TypeError, ValueError, OverflowError):
+            raise FsidError(f"{key}: {record[key]!r:.60} is not that of four sites") from None
+        if not is_same:
             raise FsidError(
                 f"sample {made['key']}: was made with another {key} than {made['profile']} says now; "
                 "put the profile back as it was"

@@ -9,7 +9,6 @@ when, and not on how often the run was interrupted. A frame that still looks lik
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -88,7 +87,9 @@ class Settle:
 
     def _redraw(self, path: Path, worker: Worker) -> None:
         samples = read_samples(path)
-        for frame in _frames(json.loads(files["json"]) for files in samples.values()):
+        with records_of(path):
+            frames = list(_frames(read_records(path)))
+        for frame in frames:
             last = frame
             while last.is_open(self.looks):
                 refused = (*last.refused, "near-duplicate")

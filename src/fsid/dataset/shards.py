@@ -164,7 +164,7 @@ def records_of(path: Path) -> Iterator[None]:
     """FsidError where the block fails for what the records of a shard lack, or hold instead."""
     try:
         yield
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         reason = f"lacks {error}" if isinstance(error, KeyError) else str(error)
         raise FsidError(
             f"{path}: the JSON of a sample is not of fsid generate ({reason}); delete it and generate again"

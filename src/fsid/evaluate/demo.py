@@ -7,7 +7,6 @@ denoiser.
 
 from __future__ import annotations
 
-import io
 import json
 from collections.abc import Callable
 from contextlib import AbstractContextManager
@@ -16,7 +15,6 @@ from importlib.resources import as_file, files
 from pathlib import Path
 
 import numpy as np
-from PIL import Image
 
 from fsid.config import check_fields
 from fsid.dataset import (
@@ -29,6 +27,7 @@ from fsid.dataset import (
     shard_keys,
     to_uint8,
 )
+from fsid.dataset.picture import stored_preview
 from fsid.denoise import TrainConfig, load_history, train, train_config
 from fsid.errors import FsidError
 from fsid.evaluate.claim import claimed
@@ -174,7 +173,7 @@ def _samples(data: Path) -> list[tuple[Path, str]]:
 
 
 def _contact_sheet(data: Path) -> np.ndarray:
-    return grid([np.asarray(_preview(shard, key).reduce(4)) for shard, key in _samples(data)])
+    return grid([np.asarray(stored_preview(shard, key).reduce(4)) for shard, key in _samples(data)])
 
 
 def _overview(out: Path, ours: Method, window_px: int = 180) -> np.ndarray:
@@ -203,11 +202,7 @@ def _pair_to_show(data: Path, window_px: int) -> tuple[Path, str]:
         return json.loads(read_member(sample[0], f"{sample[1]}.json"))["iso"]
 
     def detail(sample: tuple[Path, str]) -> float:
-        return detailed_window(np.asarray(_preview(*sample)) / 255, window_px)[1]
+        return detailed_window(np.asarray(stored_preview(*sample)) / 255, window_px)[1]
 
     noisiest = sorted(sorted(_samples(data), key=iso)[-8:], key=detail)
     return noisiest[len(noisiest) // 2]
-
-
-def _preview(shard: Path, key: str) -> Image.Image:
-    return Image.open(io.BytesIO(read_member(shard, f"{key}.rgb.png")))

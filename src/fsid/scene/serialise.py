@@ -7,7 +7,7 @@ unknown or of the wrong type is an error that names where it is. Floats are writ
 from __future__ import annotations
 
 import json
-import math
+import sys
 from dataclasses import fields, is_dataclass
 from types import GenericAlias, NoneType, UnionType
 from typing import Any, Union, get_args, get_origin, get_type_hints
@@ -63,7 +63,7 @@ def _read(kind: Any, data: Any, where: str) -> Any:
         return {key: _read(arguments[1], value, f"{where}.{key}") for key, value in data.items()}
     if kind is float:
         number = isinstance(data, int | float) and not isinstance(data, bool)
-        _expect(number and math.isfinite(data), where, "a finite number")
+        _expect(number and abs(data) <= sys.float_info.max, where, "a finite number")
         return float(data)
     is_kind = isinstance(data, kind) and isinstance(data, bool) == (kind is bool)
     _expect(is_kind, where, f"of type {kind.__name__}")
