@@ -161,6 +161,15 @@ def test_a_broken_file_is_one_line_that_names_it(tmp_path: Path, text: str, word
     assert "\n" not in str(caught.value)
 
 
+def test_values_are_counted_while_they_are_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Each takes a kilobyte: a file of 64 MiB may hold 30 million."""
+    monkeypatch.setattr("fsid.config._MOST_NODES", 100)
+    file = tmp_path / "long.yaml"
+    file.write_text("inner: {names: [" + "x, " * 101 + "]}\n{")  # what is broken comes after them
+    with pytest.raises(FsidError, match=r"long\.yaml: is not valid YAML \(it has more than 100 values\)"):
+        load_settings(Outer, file)
+
+
 def test_a_merged_key_may_be_overridden(tmp_path: Path):
     file = tmp_path / "merged.yaml"
     file.write_text("inner: {<<: {rate: 2, names: [x]}, rate: 3}")

@@ -283,6 +283,14 @@ def save_settings(settings: Any, file: Path) -> None:
 
 
 class _Loader(yaml.SafeLoader):
+    _composed = 0
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        self._composed += 1
+        if self._composed > _MOST_NODES:  # which take about a kilobyte each
+            raise yaml.YAMLError(f"it has more than {_MOST_NODES:,} values")
+        return super().compose_node(parent, index)
+
     def get_single_node(self) -> yaml.Node | None:
         node = super().get_single_node()
         if node is not None and _nodes(node, {}) > _MOST_NODES:
