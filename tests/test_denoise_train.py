@@ -580,6 +580,33 @@ def test_a_run_stays_with_its_noise(data: Path, tmp_path: Path) -> None:
         train(data, run, config, quiet=True)
 
 
+@pytest.mark.parametrize("said", ["made: 2026-11-29", "key: !!binary aGVsbG8=", "of: !!set {a, b}"])
+def test_settings_of_data_that_no_card_can_say_are_named_before_the_training(
+    said: str, data: Path, tmp_path: Path
+) -> None:
+    """They were a traceback when the first network was to be saved."""
+    folder = tmp_path / "data"
+    shutil.copytree(data, folder)
+    save_settings(DatasetConfig(0, 2, GenerateConfig()), folder / "config.yaml")
+    with (folder / "config.yaml").open("a") as file:
+        file.write(f"{said}\n")
+    with pytest.raises(FsidError, match=r"config\.yaml: holds what is neither text nor number"):
+        train(folder, tmp_path / "run", replace(CONFIG, steps=1), quiet=True)
+    assert not list((tmp_path / "run").glob("*.safetensors"))
+
+
+@pytest.mark.parametrize("keys", [[{}], [["a"]], [1, "a"]])
+def test_a_run_that_holds_out_what_no_key_is_is_refused(
+    keys: list[object], data: Path, tmp_path: Path
+) -> None:
+    run = tmp_path / "run"
+    train(data, run, replace(CONFIG, steps=1), quiet=True)
+    rows = json.loads((run / "sessions.json").read_text())
+    (run / "sessions.json").write_text(json.dumps([row | {"held_out": keys} for row in rows]))
+    with pytest.raises(FsidError, match=r"is there no more, on which the run in .* is validated"):
+        train(data, run, replace(CONFIG, steps=1), quiet=True)
+
+
 @pytest.mark.parametrize("has_settings", [True, False])
 def test_a_run_stays_with_its_dataset(has_settings: bool, tmp_path: Path) -> None:
     def dataset(name: str, seed: int, shards: int = 1) -> Path:

@@ -32,7 +32,8 @@ def sizes_as_begun(run_dir: Path, config: TrainConfig) -> TrainConfig:
 def held_out_as_begun(run_dir: Path) -> list[str] | None:
     """Keys of the images that the run in `run_dir` holds out since it began; None where it says none yet."""
     rows = read_sessions(run_dir) if has_network(run_dir) else []
-    return next((row["held_out"] for row in rows if isinstance(row.get("held_out"), list)), None)
+    stated = next((row["held_out"] for row in rows if isinstance(row.get("held_out"), list)), None)
+    return None if stated is None else [str(key) for key in stated]
 
 
 def _begun_with(file: Path) -> TrainConfig:

@@ -244,9 +244,8 @@ class _Keeper:
 
 def _card(data_dir: Path, config: TrainConfig, images: int, initial: Denoiser | None) -> ModelCard:
     """The card of the network to come, without results."""
-    file = data_dir / CONFIG_FILE
     training = f"{counted(images, 'image')} of {data_dir.resolve().name}"
-    details = {"config": to_plain(config), "data": read_yaml(file) if file.is_file() else {}}
+    details = {"config": to_plain(config), "data": _settings_of(data_dir)}
     cameras = [load_bayer_profile(name) for name in config.profiles]
     lowest = max(-camera.black_level / camera.span for camera in cameras)
     most_noise = max(variance_at_grey(camera.level(config.iso_max)) for camera in cameras)
@@ -255,6 +254,17 @@ def _card(data_dir: Path, config: TrainConfig, images: int, initial: Denoiser | 
         most_noise = max(most_noise, initial.card.most_noise)
         details["initial"] = to_plain(initial.card)
     return ModelCard(config.network, config.patch_px, training, details, lowest, most_noise)
+
+
+def _settings_of(data_dir: Path) -> dict[str, object]:
+    """What the config.yaml of a dataset says; FsidError for what no card can say: dates, bytes, sets."""
+    file = data_dir / CONFIG_FILE
+    plain = read_yaml(file) if file.is_file() else {}
+    try:
+        json.dumps(plain)
+    except (TypeError, ValueError) as error:
+        raise FsidError(f"{file}: holds what is neither text nor number ({error}); quote it") from None
+    return plain
 
 
 def load_history(run_dir: str | Path) -> tuple[list[int], list[float], list[float]]:
