@@ -76,7 +76,7 @@ def onnx_denoiser(graph: bytes, source: str, *, threads: int = 0) -> OnnxDenoise
 
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = threads
-    options.log_severity_level = 3  # it warns that inputs with defaults are not constants
+    options.log_severity_level = 4  # errors are raised, too; it would print names as they are in the file
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
     try:
         session = onnxruntime.InferenceSession(graph, options, providers=["CPUExecutionProvider"])
