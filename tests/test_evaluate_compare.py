@@ -384,6 +384,11 @@ def _described(**changes: object) -> str:
         ("{", "not valid JSON"),
         ('{"camera": "x"}', "testset"),
         (
+            '{"camera": "x", "levels": ["iso1"], "images": [{"name": "..", "set": "s"}], '
+            '"seed": 0, "notes": ""}',
+            "'..' is not a plain file name",
+        ),
+        (
             '{"camera": "x", "levels": ["iso1"], "images": [{"name": "../../etc", "set": "s"}], '
             '"seed": 0, "notes": ""}',
             "plain file name",

@@ -121,7 +121,7 @@ def read_testset(root: str | Path) -> TestSet:
     testset = from_plain(TestSet, read_json(file), source=str(file))
     names = [*testset.levels, *(image.name for image in testset.images)]
     for name in names:
-        if not name or name != Path(name).name:
+        if name in ("", "..") or name != Path(name).name:
             raise FsidError(f"{file}: {name!r} is not a plain file name")
     for image, level, frame in product(testset.images, testset.levels, range(testset.frames)):
         for capture in (testset.clean(root, image, level), testset.noisy(root, image, level, frame)):
