@@ -14,6 +14,7 @@ from fsid.config import read_json, read_yaml
 from fsid.dataset import grid, save_png, shard_keys, to_uint8
 from fsid.dataset.photos import read_photo
 from fsid.dataset.pictures import read_exr
+from fsid.dataset.shards import part_path, write_shard
 from fsid.errors import FsidError
 from fsid.evaluate.testset import TESTSET_FILE, read_testset
 from fsid.files import check_folder, make_folder, write_atomically, write_together
@@ -24,6 +25,31 @@ def test_a_file_is_replaced_whole(tmp_path: Path) -> None:
     write_atomically(tmp_path / "a", b"old")
     write_atomically(tmp_path / "a", b"new")
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {"a": b"new"}
+
+
+@pytest.mark.parametrize(
+    "write",
+    [write_atomically, lambda path, data: write_shard(path, [("a", {"b": data})])],
+    ids=["file", "shard"],
+)
+def test_nothing_is_written_through_a_link_that_lies_in_the_way(
+    tmp_path: Path, write: Callable[[Path, bytes], None]
+) -> None:
+    """The names of unfinished files can be guessed: a folder of others may hold links, or pipes, for all."""
+    victim, path = tmp_path / "victim", tmp_path / "a.tar"
+    victim.write_bytes(b"precious")
+    parts = path.with_name(f"a.tar.{os.getpid()}.part"), part_path(path)
+    for part in parts:
+        part.symlink_to(victim)
+    write(path, b"new")
+    assert victim.read_bytes() == b"precious"
+    assert b"new" in path.read_bytes()
+    assert not path.is_symlink()
+    for part in parts:
+        part.unlink(missing_ok=True)
+        os.mkfifo(part)
+    write(path, b"newer")
+    assert b"newer" in path.read_bytes()
 
 
 def test_what_is_no_file_is_not_replaced_by_one(tmp_path: Path) -> None:

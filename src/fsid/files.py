@@ -67,7 +67,7 @@ def write_together(files: Mapping[Path, bytes]) -> None:
                 raise OSError(errno.EISDIR, os.strerror(errno.EISDIR))
             if path.exists() and not path.is_file():
                 raise FsidError(f"{path}: cannot be written (it is no file); give another name")
-            parts[path].write_bytes(data)
+            _write_new(parts[path], data)
         for path, part in parts.items():
             os.replace(part, path)
     except OSError as error:
@@ -76,6 +76,14 @@ def write_together(files: Mapping[Path, bytes]) -> None:
         for part in parts.values():
             with contextlib.suppress(OSError):  # gone already, or never there
                 part.unlink()
+
+
+def _write_new(part: Path, data: bytes) -> None:
+    """A file and nothing else: a killed process may have left one of this name, and a folder of others hold a
+    link, through which a file elsewhere would be written, or a pipe, which would be waited for."""
+    part.unlink(missing_ok=True)
+    with part.open("xb") as file:
+        file.write(data)
 
 
 def check_folder(folder: Path) -> None:

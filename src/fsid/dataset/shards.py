@@ -76,8 +76,9 @@ def write_shard(path: str | Path, samples: Iterable[tuple[str, Mapping[str, byte
     part = part_path(path)
     with _disk_refusals(path):
         try:
+            part.unlink(missing_ok=True)
             with (
-                part.open("wb") as file,
+                part.open("xb") as file,
                 tarfile.open(fileobj=file, mode="w", format=tarfile.USTAR_FORMAT) as tar,
             ):
                 for _ in starmap(partial(_add, tar), samples):  # a loop would keep one while the next is made

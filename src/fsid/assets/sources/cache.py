@@ -15,6 +15,7 @@ import contextlib
 import hashlib
 import io
 import os
+import secrets
 import zipfile
 import zlib
 from collections.abc import Sequence
@@ -113,10 +114,11 @@ def _replace(name: str, data: bytes) -> None:
     folder = cache_folder("meshes")
     if folder is None:
         return
-    part = folder / f"{name}.{os.getpid()}.part"
+    part = folder / f"{name}.{secrets.token_hex(8)}.part"
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        part.write_bytes(data)
+        with part.open("xb") as file:  # through no link that others laid in a folder they share
+            file.write(data)
         os.replace(part, folder / name)
     except OSError:
         with contextlib.suppress(OSError):
