@@ -415,6 +415,12 @@ def test_more_crops_than_windows_are_named_before_anything_is_written(tmp_path: 
     assert not (tmp_path / "out").exists()
 
 
+def test_more_pairs_of_a_frame_than_memory_holds_are_named():
+    """All of a frame are made before the first is written."""
+    with pytest.raises(FsidError, match=r"noise_levels: 10002 pairs of a frame, .* at most 10000"):
+        small("noise_levels=5001", "exposures=2")
+
+
 @pytest.fixture
 def album(photos: Path, tmp_path: Path) -> Path:
     """A folder of three photographs that a test may change."""

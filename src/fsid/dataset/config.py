@@ -23,6 +23,7 @@ RENDERED = ("variant", "renderer", "quality", "supersampling", "lens_images", "t
 _POSITIVE = ("crops", "exposures", "noise_levels", "lens_images")
 _HIGHEST_ISO = 10_000_000
 _LARGEST_PX = 16384
+_MOST_PAIRS = 10_000
 
 
 @dataclass(frozen=True)
@@ -112,6 +113,11 @@ class GenerateConfig:
         for key in _POSITIVE:
             if getattr(self, key) < 1:
                 raise FsidError(f"{key}: {getattr(self, key)} is not a whole number of at least 1")
+        if self.pairs_per_frame > _MOST_PAIRS:
+            raise FsidError(
+                f"crops, exposures, noise_levels: {self.pairs_per_frame} pairs of a frame, which are made "
+                f"together; at most {_MOST_PAIRS}"
+            )
         if self.validation_every < 0:
             raise FsidError(f"validation_every: {self.validation_every} is negative; 0 means no validation")
         if self.scale not in (2, 4):
