@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from fsid.assets.sources import mesh_sources, survey_meshes
+from fsid.assets.sources import load_source, mesh_sources, survey_meshes
 from fsid.assets.sources.catalogue import CATALOGUE
 from fsid.assets.sources.limits import MAX_JSON_VALUES, MAX_LICENCE_LETTERS, MAX_LINES
 from fsid.assets.survey import KNOWN
@@ -308,6 +308,34 @@ def test_a_zip_that_states_a_huge_directory_is_not_opened(tmp_path: Path):
     data[-10:-6] = struct.pack("<I", 2**31)
     (tmp_path / "x.sh3f").write_bytes(data)
     assert "too many members" in refused(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"faces": np.full((12, 3), 10**6, np.int32)},
+        {"faces": np.zeros((12, 3))},
+        {"vertices": np.zeros(3, np.float32)},
+        {"face_parts": np.full(12, -1, np.int32)},
+        {"part_names": np.array([print], object)},
+        {"measures": np.zeros(2)},
+    ],
+    ids=lambda changes: next(iter(changes)),
+)
+def test_what_others_put_into_a_cache_that_they_share_is_made_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, changes: dict[str, np.ndarray]
+) -> None:
+    monkeypatch.setenv("FSID_CACHE", str(tmp_path / "cache"))
+    GOOD.export(tmp_path / "a.ply")
+    name = f"file:{tmp_path}/a.ply"
+    mesh, survey = load_source(name), survey_meshes(str(tmp_path))
+    (entry,) = (tmp_path / "cache" / "meshes").glob("*.npz")
+    with np.load(entry) as stored:
+        arrays = dict(stored)
+    np.savez(entry, **arrays | changes)
+    KNOWN.clear()
+    assert survey_meshes(str(tmp_path)) == survey
+    np.testing.assert_array_equal(load_source(name).faces, mesh.faces)
 
 
 def test_random_damage_is_always_one_line(tmp_path: Path):

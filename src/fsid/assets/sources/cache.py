@@ -59,13 +59,34 @@ def load_mesh(key: str) -> Mesh | None:
         return None
     *arrays, names = stored
     vertices, normals, faces, face_parts = arrays
+    if not _is_mesh(vertices, normals, faces, face_parts, names.size if names.ndim == 1 else 0):
+        return None
     return Mesh(vertices, normals, faces, face_parts, tuple(str(name) for name in names))
+
+
+def _is_mesh(
+    vertices: np.ndarray, normals: np.ndarray, faces: np.ndarray, face_parts: np.ndarray, parts: int
+) -> bool:
+    """Whether arrays fit each other: others may write to a folder that they share, and what draws a mesh
+    believes its indices."""
+    return (
+        (vertices.ndim, faces.ndim, face_parts.ndim) == (2, 2, 1)
+        and vertices.shape == normals.shape == (len(vertices), 3)
+        and faces.shape == (len(face_parts), 3)
+        and vertices.dtype == normals.dtype == np.float32
+        and faces.dtype == face_parts.dtype == np.int32
+        and len(faces) > 0
+        and bool(np.isfinite(vertices).all() and np.isfinite(normals).all())
+        and bool(faces.min() >= 0 and faces.max() < len(vertices))
+        and bool(face_parts.min() >= 0 and face_parts.max() < parts)
+    )
 
 
 def load_measures(key: str) -> np.ndarray | None:
     """(4,) `measures` of the mesh stored under a key, which are read without it; else as `load_mesh`."""
     stored = _load(key, ("measures",))
-    return stored[0] if stored else None
+    is_whole = stored is not None and stored[0].shape == (4,) and stored[0].dtype == np.float64
+    return stored[0] if stored is not None and is_whole else None
 
 
 def measures(mesh: Mesh) -> np.ndarray:
