@@ -6,6 +6,7 @@ import pytest
 from fsid.errors import FsidError
 from fsid.render.frame import Frame
 from fsid.sensor import (
+    NoiseLevel,
     clean_from_frame,
     clean_from_linear,
     clean_from_photo,
@@ -16,6 +17,7 @@ from fsid.sensor import (
     profile_names,
     to_dn,
 )
+from fsid.sensor.tone import photo_to_linear
 
 
 def _frame(radiance: np.ndarray) -> Frame:
@@ -108,3 +110,34 @@ def test_what_is_no_exposure_is_refused(exposure: np.ndarray | float):
     light = np.full((4, 4, 3), 1e-41, np.float32)
     with pytest.raises(FsidError, match="exposure of linear light must be finite"):
         clean_from_linear(np.random.default_rng(0), light, load_profile("pixel6"), exposure)
+
+
+def test_a_noisy_image_states_the_noise_it_has_and_rounding_is_a_part_of_it():
+    """Of a camera without other noise than its rounding, the noisy image is the clean one, rounded."""
+    profile = load_profile("pixel6")
+    clean = CLEAN["linear"](np.random.default_rng(0), profile)
+    level = NoiseLevel((0.0,) * 4, (1 / 12 / profile.span**2,) * 4)
+    noisy = noisy_from_clean(np.random.default_rng(1), clean, 200, level)
+    np.testing.assert_array_equal(to_dn(noisy), to_dn(clean))
+    assert (noisy.noise, noisy.iso) == (level, 200)
+
+
+def test_the_exposure_of_linear_light_multiplies_it():
+    profile, gains = load_profile("pixel6"), np.array([0.3, 0.5, 0.4], np.float32)
+    one = clean_from_linear(np.random.default_rng(0), _light() / 21, profile, gains)
+    other = clean_from_linear(np.random.default_rng(0), _light() / 21 * gains, profile)
+    np.testing.assert_allclose(one.mosaic, other.mosaic, rtol=1e-5)
+
+
+def test_photographs_are_darkened_as_by_brooks_et_al():
+    """By a factor of mean 0.8 and sigma 0.1, cut off at 0.5 and 1.1: grey at a green pixel, of gain 1."""
+    profile, grey = load_profile("pixel6"), np.full((4, 4, 3), 0.5, np.float32)
+    light = photo_to_linear(np.float32(0.5))
+    greens = [
+        pack(clean_from_photo(np.random.default_rng(seed), grey, profile).mosaic, profile.cfa)[1, 0, 0]
+        for seed in range(1000)
+    ]
+    factors = np.array(greens) / light
+    assert factors.mean() == pytest.approx(0.8, abs=0.015)
+    assert factors.std() == pytest.approx(0.1, abs=0.01)
+    assert 0.5 - 1e-5 < factors.min() < factors.max() < 1.1 + 1e-5

@@ -20,7 +20,7 @@ from fsid.sensor import (
 )
 from fsid.sensor.colour import SRGB_TO_XYZ, published_matrices
 from fsid.sensor.exposure import BALANCED_RANGE, KEY_RANGE
-from fsid.sensor.tone import inverse_tone_curve, tone_curve
+from fsid.sensor.tone import inverse_tone_curve, photo_to_linear, tone_curve
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -64,6 +64,18 @@ def test_highlights_are_exposed_as_much_as_the_light_below_them():
     light = srgb_decode(inverse_tone_curve(ramp[..., 1]))
     camera = unprocess(ramp, matrix, gains, exposure=1.05)
     np.testing.assert_allclose(camera[..., 1], np.minimum(1.05 * light, 1), atol=1e-5)
+
+
+def test_highlights_are_preserved_as_by_brooks_et_al(rng):
+    """Their eq. 2 and 3, of coloured highlights: grey is the mean of the camera's channels, t is 0.9."""
+    matrix, gains = published_matrices()[1], np.array([2.2, 1.0, 1.7])
+    srgb = tone_curve(srgb_encode(rng.uniform(0.7, 1.0, (20, 20, 1)) + rng.uniform(-0.1, 0.1, (20, 20, 3))))
+    linear = photo_to_linear(srgb).astype(float)
+    balanced = linear @ srgb_to_camera_matrix(matrix).T
+    share = (np.maximum(balanced.mean(axis=-1, keepdims=True) - 0.9, 0) / 0.1) ** 2
+    assert np.sum((share > 0.05) & (share < 0.95)) > 20
+    expected = balanced * np.maximum(share + (1 - share) * 0.8 / gains, 0.8 / gains)
+    np.testing.assert_allclose(unprocess(srgb, matrix, gains, 0.8), expected.clip(0, 1), atol=2e-4)
 
 
 @settings(max_examples=40, deadline=None)
@@ -250,3 +262,30 @@ def test_no_channel_is_balanced_by_more_than_a_factor_of_four():
     shares = np.log(gains[:, 1:] / gains[:, :1]) / np.log(16)
     np.testing.assert_allclose(shares[:, 0], shares[:, 1], rtol=1e-4)
     assert 0.1 - 1e-4 < shares.min() < 0.15 < 0.75 < shares.max() < 0.8 + 1e-4
+
+
+def test_grey_light_becomes_a_key_from_a_stop_over_to_one_and_a_third_under_a_card(monkeypatch):
+    monkeypatch.setattr("fsid.sensor.exposure.OVEREXPOSED_SHARE", 0.0)
+    rng, grey = np.random.default_rng(0), np.full((8, 8, 3), 3.0, np.float32)
+    keys = np.array([expose(rng, grey)[0, 0] @ SRGB_TO_XYZ[1] for _ in range(300)])
+    assert 0.07 - 1e-4 < keys.min() < 0.075
+    assert 0.34 < keys.max() < 0.36 + 1e-4
+    assert np.log(keys).mean() == pytest.approx(np.log(0.07 * 0.36) / 2, abs=0.1)
+
+
+def test_what_is_black_has_no_part_in_white_balance():
+    lit = np.random.default_rng(3).uniform(0.2, 0.5, (20, 20, 3)).astype(np.float32)
+    half = np.concatenate([lit, np.zeros_like(lit)])
+    whole, dark = (exposure_rand(np.random.default_rng(0), light) for light in (lit, half))
+    np.testing.assert_allclose(dark / dark[1], whole / whole[1], rtol=1e-5)
+
+
+def test_highlights_of_two_fifths_of_a_frame_hold_its_exposure_back(monkeypatch):
+    """At most a quarter may be clipped, however dark the middle then is."""
+    monkeypatch.setattr("fsid.sensor.exposure.OVEREXPOSED_SHARE", 0.0)
+    light = np.ones((10, 10, 3), np.float32)
+    light[:4] = 100
+    for seed in range(10):
+        assert (expose(np.random.default_rng(seed), light) @ SRGB_TO_XYZ[1]).max() == pytest.approx(
+            1, rel=1e-3
+        )
