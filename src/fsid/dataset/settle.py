@@ -88,7 +88,7 @@ class Settle:
     def _redraw(self, path: Path, worker: Worker) -> None:
         samples = read_samples(path)
         with records_of(path):
-            frames = list(_frames(read_records(path)))
+            frames = list(_frames(head for _, head in read_heads(path)))
         for frame in frames:
             last = frame
             while last.is_open(self.looks):
