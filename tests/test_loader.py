@@ -204,6 +204,7 @@ def test_sizes_are_different_powers_of_two(shrink: tuple[int, ...]) -> None:
         (1920, 1080, 64, (1, 2, 4)),
         (1080, 1920, 64, (1, 2, 4)),
         (4000, 3000, 64, (1, 2, 4, 8)),
+        (960, 540, 64, (1, 2)),
         (958, 540, 64, (1,)),
         (1920, 500, 64, (1, 2)),
         (1920, 1080, 200, (1, 2)),
@@ -577,6 +578,30 @@ def test_the_cells_start_elsewhere_in_every_epoch(dataset: Path) -> None:
         counts = np.bincount(starts[:, axis], minlength=left + 1)
         assert len(counts) == left + 1
         assert counts.min() > 0.4 * counts.mean()
+
+
+def test_rows_and_columns_of_a_square_start_by_themselves(tmp_path: Path) -> None:
+    grid = Grid(index_mosaics(write_dataset(tmp_path, [raw(np.zeros((40, 40), int))])), size_px=6)
+    starts = np.array([grid.cell(grid.patches * epoch, seed=1).corner for epoch in range(400)]) % grid.pitch
+    assert abs(np.corrcoef(starts.T)[0, 1]) < 0.2
+
+
+def test_every_epoch_has_an_order_of_its_own(dataset: Path) -> None:
+    grid = Grid(index_mosaics(dataset), size_px=6)
+    cells = [grid.cell(place, seed=1) for place in range(2 * grid.patches)]
+    order = [(cell.mosaic.key, cell.corner[0] // grid.pitch, cell.corner[1] // grid.pitch) for cell in cells]
+    first, second = order[: grid.patches], order[grid.patches :]
+    assert sorted(first) == sorted(second)
+    assert first != second
+
+
+def test_a_cell_has_only_whole_tiles_of_an_image_made_smaller(tmp_path: Path) -> None:
+    """30 rows become 15, of which 14 are tiles: there is one place for a cell of 14."""
+    data = write_dataset(tmp_path, [raw(np.zeros((30, 2 * WIDTH), int))])
+    grid = Grid(index_mosaics(data), size_px=6, shrink=2)
+    for position in range(100):
+        rows, _ = grid.cell(position, seed=1).window
+        assert (rows.start, rows.stop) == (0, 28)
 
 
 def test_every_length_is_permuted() -> None:
