@@ -39,6 +39,14 @@ def test_slope_of_a_known_spectrum(slope):
     assert spectrum_slope(_noise(slope)) == pytest.approx(slope, abs=0.15)
 
 
+def test_slope_is_of_the_middle_of_the_spectrum():
+    """Neither light and shade of a whole picture nor what demosaicing and noise reduction leave count."""
+    frequency = np.hypot(np.fft.fftfreq(256)[:, None], np.fft.rfftfreq(256))
+    outside = (frequency < 0.03) | (frequency > 0.37)
+    altered = np.fft.irfft2(np.fft.rfft2(_noise(-2)) * np.where(outside, 4, 1))
+    assert spectrum_slope(altered) == pytest.approx(spectrum_slope(_noise(-2)), abs=0.1)
+
+
 @pytest.mark.parametrize("size", [16, 24, 32, 48])
 def test_small_pictures_have_all_statistics_too(size):
     image = np.random.default_rng(0).uniform(0.2, 0.8, (size, size + 6, 3))
@@ -60,6 +68,42 @@ def test_shares_of_black_and_clipped_pixels_are_counted():
     values = measure(image)
     assert values["black_share"] == pytest.approx(0.1)
     assert values["clipped_share"] == pytest.approx(0.2)
+
+
+def test_black_is_told_by_luma_and_clipped_by_the_brightest_colour():
+    """Rec. 709: 0.9 of blue is 0.065 of luma, 0.3 of red 0.064, 0.12 of green 0.086."""
+    colours = [
+        (0, 0, 0.9),
+        (0.3, 0, 0),
+        (0, 0.12, 0),
+        (0.07, 0.07, 0.07),
+        (0.2, 0.3, 0.996),
+        (0.99, 0.99, 0.99),
+    ]
+    image = np.array(colours, np.float32).repeat(16, axis=0)[None].repeat(16, axis=0)
+    values = measure(image)
+    assert values["black_share"] == pytest.approx(3 / 6)
+    assert values["clipped_share"] == pytest.approx(1 / 6)
+
+
+def test_a_patch_is_flat_whose_luma_varies_by_less_than_two_levels_of_eight_bits():
+    wave = np.where(np.indices((16, 16)).sum(0) % 2, 1.0, -1.0)
+    patches = np.concatenate([0.5 + level / 255 * wave for level in (1.0, 1.9, 2.1, 4.0)]).astype(np.float32)
+    assert measure(_grey(patches))["flat_share"] == 0.5
+
+
+def test_a_slope_is_as_steep_as_both_its_parts():
+    down, right = np.indices((64, 64)).astype(np.float32)
+    values = measure(_grey(0.1 + 0.004 * down + 0.003 * right))
+    assert 10 ** np.median(values["gradient"]) - 1e-3 == pytest.approx(0.005, rel=1e-3)
+
+
+def test_an_edge_begins_at_a_step_of_ten_levels_of_eight_bits():
+    """Smoothed by 1 pixel, a step of h has 4 x 0.68 h under Sobel's kernel: 0.1 from h = 0.037 on."""
+    for height, is_edge in ((0.033, False), (0.041, True)):
+        luma = np.full((32, 32), 0.3, np.float32)
+        luma[:, 16:] += height
+        assert (measure(_grey(luma))["edge_ratio"][0] > 0) == is_edge
 
 
 def test_orientation_tells_stripes_from_each_other():

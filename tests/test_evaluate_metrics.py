@@ -24,6 +24,7 @@ def test_psnr_of_a_known_error(rng: np.random.Generator):
 
 def test_values_outside_the_range_count_as_clipped():
     assert psnr(np.full((8, 8), -3.0), np.zeros((8, 8))) == float("inf")
+    assert psnr(np.ones((8, 8)), np.full((8, 8), 1.3)) == float("inf")
 
 
 @pytest.mark.parametrize("metric", [psnr, ssim])

@@ -25,7 +25,7 @@ QUANTILES = 32
 PATCH_PX = 16
 CANNY_SIGMA_PX = 1.0
 CANNY_LOW, CANNY_HIGH = 0.04, 0.1
-"""Hysteresis thresholds of the gradient of sRGB-encoded luma, 0..1 per pixel."""
+"""Hysteresis thresholds of what Sobel's kernels make of encoded luma: 8 times its slope per pixel."""
 FLAT_STD = 2.0 / 255.0
 """A patch whose luma varies by less than this (standard deviation, encoded) is flat."""
 BLACK, CLIPPED = 0.08, 0.995
