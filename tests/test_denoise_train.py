@@ -46,7 +46,7 @@ from fsid.denoise.checkpoint import TrainState, load_checkpoint  # noqa: E402
 from fsid.denoise.denoise import variance_at_grey  # noqa: E402
 from fsid.denoise.raw_denoiser import RawDenoiser  # noqa: E402
 from fsid.denoise.stabilise import stabilise, unstabilise  # noqa: E402
-from fsid.denoise.train import _prepare, _step, learning_rate, noise_left  # noqa: E402
+from fsid.denoise.train import _prepare, _step, learning_rate, mean_psnr, noise_left  # noqa: E402
 from fsid.denoise.validate import Validation, _captures, held_out, validation  # noqa: E402
 from fsid.errors import FsidError  # noqa: E402
 from fsid.files import held  # noqa: E402
@@ -723,6 +723,38 @@ def test_learning_rate_rises_and_falls() -> None:
     assert rates[:10] == sorted(rates[:10])
     assert rates[9:] == sorted(rates[9:], reverse=True)
     assert rates[-1] == pytest.approx(0.01, rel=0.1)
+    assert rates[4] == pytest.approx(0.5)
+    assert rates[10 + 45] == pytest.approx((1 + 0.01) / 2)
+
+
+def test_a_row_of_the_history_is_the_mean_of_its_steps() -> None:
+    state = TrainState.start(torch.nn.Linear(1, 1))
+    assert state.log(1.0, 30.0, 0.1, is_due=False) is None
+    assert state.log(3.0, 40.0, 0.1, is_due=True) == {
+        "step": 0,
+        "loss": 2.0,
+        "psnr": 35.0,
+        "learning_rate": 0.1,
+    }
+
+
+def test_the_psnr_of_a_batch_is_the_mean_of_its_patches() -> None:
+    clean = torch.zeros(2, 4, 8, 8)
+    estimate = clean + torch.tensor([0.1, 0.01])[:, None, None, None]
+    assert mean_psnr(estimate, clean).item() == pytest.approx((20 + 40) / 2, rel=1e-5)
+
+
+def test_a_step_forgets_the_gradients_of_the_one_before() -> None:
+    net, optimizer = _prepare(Accelerator(cpu=True), CONFIG, None)
+    clean, noise = torch.full((1, 4, 16, 16), 0.3), torch.full((1, 4), 1e-3)
+    noisy = clean + 0.02 * torch.randn(clean.shape, generator=torch.Generator().manual_seed(0))
+    norms = []
+    for _ in range(2):
+        config, batch = replace(CONFIG, clip_norm=1e6), Batch(noisy, clean, noise, noise)
+        _step(Accelerator(cpu=True), net, net, optimizer, batch, 0.0, config)
+        norms.append(float(sum(p.grad.square().sum() for p in net.parameters() if p.grad is not None)))
+    assert norms[1] == pytest.approx(norms[0], rel=1e-6)
+    assert norms[0] > 0
 
 
 @pytest.mark.parametrize("name", ["nafnet-tiny", "nafnet-small", "nafnet-32", "nafnet-64", "paper"])

@@ -107,3 +107,5 @@ def test_no_shutter_is_faster_than_a_hundred_thousandth():
     level = light_level(PIXEL, 1e8)
     assert level.exposure_s == pytest.approx(1e-5)
     assert level.dimming > 1
+    grey = Raw(np.full((4, 4), 0.5, np.float32), "RGGB", 0, 1023, (1.0, 1.0, 1.0), np.eye(3))
+    assert dimmed(grey, level).mosaic.max() == 1
