@@ -179,6 +179,35 @@ def test_flow_meets_the_same_point_in_the_other_image(renderer: Renderer, lens: 
     np.testing.assert_array_equal(flow_between(a, in_two, here, there, LABEL_SAMPLE), flow)
 
 
+def test_flow_of_what_moves_and_turns_is_that_of_its_motion(renderer: Renderer) -> None:
+    """By hand, from depth: 0.2 s of 0.8 and 0.2 m/s and of 60 degrees/s about the ball's upright axis; into
+    an image of twice the size, where what stands still is at twice the place. Behind a camera there is none.
+    """
+    what = moved_view(width=96, height=96, time_s=0.1)
+    there = replace(what.camera, width=192, height=192, time_s=0.3)
+    frame = draw(renderer, what)
+    cameras = [(camera, lens_of(camera), camera.time_s) for camera in (what.camera, there)]
+    flow = flow_between(frame, what.drawables, *cameras, LABEL_SAMPLE)
+    rows, columns = np.mgrid[0:96, 0:96] + LABEL_SAMPLE
+    tangent = np.tan(np.radians(30))
+    x = (columns / 48 - 1) * tangent * frame.depth
+    y = -(rows / 48 - 1) * tangent * frame.depth
+    centre = np.array([[-0.3 + 0.8 * t, 0.1 + 0.2 * t] for t in (0.1, 0.3)])
+    turn = np.radians(12)
+    right, up = x - centre[0, 0], y - centre[0, 1]
+    x1 = np.cos(turn) * right - np.sin(turn) * up + centre[1, 0]
+    y1 = np.sin(turn) * right + np.cos(turn) * up + centre[1, 1]
+    moved = np.stack([x1 / frame.depth / tangent + 1, -y1 / frame.depth / tangent + 1], -1) * 96
+    still = np.stack([columns, rows], -1)
+    ball = frame.object_id == 1
+    assert 300 < ball.sum() < 3000
+    np.testing.assert_allclose(flow[ball], (moved - still)[ball], atol=0.01)
+    np.testing.assert_allclose(flow[~ball], still[~ball], atol=0.01)
+    up_there = replace(there, target_m=(0.0, 0.0, 5.0))
+    behind = flow_between(frame, what.drawables, cameras[0], (up_there, lens_of(up_there), 0.3), LABEL_SAMPLE)
+    assert np.isnan(behind).all()
+
+
 def test_flow_of_a_still_camera_is_zero_and_nan_outside(renderer: Renderer) -> None:
     what = view(lambertian(sphere(0.3)))
     frame = draw(renderer, what)
