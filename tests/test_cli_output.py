@@ -224,6 +224,8 @@ def test_what_comes_after_has_a_bar_and_a_pace_of_its_own(
                 after(0, 8)
                 clock.now = 12.0
                 after(4, 8)
+            assert [task.percentage for task in bar._bar.tasks] == [100, 50 * is_reached]
+            assert all(task.started for task in bar._bar.tasks)  # or a bar has no length
         shown = capsys.readouterr().err
         assert "10/10 1 pairs/s, 0:00:00 left" in shown
         assert ("checking the whole" in shown) == is_reached

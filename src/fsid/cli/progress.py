@@ -34,7 +34,7 @@ class Bar:
 
     def __init__(self, bar: Progress, label: str, unit: str) -> None:
         self._bar, self._label, self._unit, self._pace, self._failures = bar, label, unit, Pace(), 0
-        self._task = bar.add_task(label, False, None, visible=False, pace=self._pace, unit=unit, failures="")
+        self._task = bar.add_task(label, total=None, visible=False, pace=self._pace, unit=unit, failures="")
 
     def then(self, label: str, unit: str) -> Bar:
         """Another below it, for what comes after it in the same call."""
