@@ -180,11 +180,17 @@ def test_rate_and_time_left_are_those_since_the_start() -> None:
     assert lefts == ["0:02:00", "0:01:30", "0:00:00"]
 
 
-def test_without_a_terminal_a_line_a_minute_says_how_far_it_is(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    """That of all bars."""
     clock = Clock()
     monkeypatch.setattr(progress, "Pace", lambda: Pace(clock))
+    return clock
+
+
+def test_without_a_terminal_a_line_a_minute_says_how_far_it_is(
+    clock: Clock, capsys: pytest.CaptureFixture[str]
+) -> None:
     told = ["pairs: 6/20 0.1 pairs/s, 0:02:20 left", "pairs: 12/20 0.1 pairs/s, 0:01:20 left"]
     told.append("pairs: 18/20 0.1 pairs/s, 0:00:20 left")
     for quiet in (False, True):
@@ -196,11 +202,9 @@ def test_without_a_terminal_a_line_a_minute_says_how_far_it_is(
 
 
 def test_a_bar_gets_shorter_where_its_terminal_is_narrow_and_its_figures_do_not(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    clock: Clock, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("COLUMNS", "80")
-    clock = Clock()
-    monkeypatch.setattr(progress, "Pace", lambda: Pace(clock))
     with progress.progress_bar("checking my photographs", "pictures", quiet=False) as bar:
         bar(0, 1000)
         clock.now = 10.0
@@ -209,11 +213,9 @@ def test_a_bar_gets_shorter_where_its_terminal_is_narrow_and_its_figures_do_not(
 
 
 def test_what_comes_after_has_a_bar_and_a_pace_of_its_own(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    clock: Clock, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("COLUMNS", "80")
-    clock = Clock()
-    monkeypatch.setattr(progress, "Pace", lambda: Pace(clock))
     for is_reached in (False, True):
         clock.now = 0.0
         with progress.progress_bar("pairs", "pairs", quiet=False) as bar:

@@ -9,6 +9,7 @@ import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
+from typing import BinaryIO
 
 from fsid.errors import FsidError
 
@@ -67,7 +68,8 @@ def write_together(files: Mapping[Path, bytes]) -> None:
                 raise OSError(errno.EISDIR, os.strerror(errno.EISDIR))
             if path.exists() and not path.is_file():
                 raise FsidError(f"{path}: cannot be written (it is no file); give another name")
-            _write_new(parts[path], data)
+            with open_new(parts[path]) as file:
+                file.write(data)
         for path, part in parts.items():
             os.replace(part, path)
     except OSError as error:
@@ -78,12 +80,12 @@ def write_together(files: Mapping[Path, bytes]) -> None:
                 part.unlink()
 
 
-def _write_new(part: Path, data: bytes) -> None:
-    """A file and nothing else: a killed process may have left one of this name, and a folder of others hold a
-    link, through which a file elsewhere would be written, or a pipe, which would be waited for."""
+def open_new(part: Path) -> BinaryIO:
+    """An unfinished file to write, and nothing else: a killed process may have left one of this name, and a
+    folder of others hold a link, through which a file elsewhere would be written, or a pipe, which would be
+    waited for. OSError where the disk refuses."""
     part.unlink(missing_ok=True)
-    with part.open("xb") as file:
-        file.write(data)
+    return part.open("xb")
 
 
 def check_folder(folder: Path) -> None:

@@ -28,7 +28,7 @@ Task = Literal["denoise", "super-resolution", "deblur", "burst"]
 RendererName = Literal["raster", "reference"]
 Quality = Literal["high", "fast"]
 _QUICKLY_READ = 100
-"""Shards, for which no further bar is shown; the records of one take a twentieth of a second."""
+"""Readings of shards, of which each has two, up to which they have no bar."""
 
 
 def generate(

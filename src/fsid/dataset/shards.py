@@ -22,7 +22,7 @@ from typing import Any
 
 from fsid.config import parse_json
 from fsid.errors import FsidError
-from fsid.files import check_file
+from fsid.files import check_file, open_new
 
 _PART = re.compile(r"\.shard-\d+\.tar\..+-\d+\.part|(config\.yaml|README\.md|samples\.png)(\.\d+)?\.part")
 """Names that writers give (`part_path`, `fsid.files.write_together`) and people hardly do."""
@@ -76,9 +76,8 @@ def write_shard(path: str | Path, samples: Iterable[tuple[str, Mapping[str, byte
     part = part_path(path)
     with _disk_refusals(path):
         try:
-            part.unlink(missing_ok=True)
             with (
-                part.open("xb") as file,
+                open_new(part) as file,
                 tarfile.open(fileobj=file, mode="w", format=tarfile.USTAR_FORMAT) as tar,
             ):
                 for _ in starmap(partial(_add, tar), samples):  # a loop would keep one while the next is made
