@@ -6,6 +6,10 @@ terminal nor a hash takes. Text that others wrote (a library's licences) may hol
 
 from __future__ import annotations
 
+PREFIX = "file:"
+"""What tells a file of the user, "file:PATH", from a family of FSID in `Object.family`, `Material.family` and
+`Sky.source`."""
+
 NOT_TEXT = "its name is not UTF-8 text"
 """Why such a file is not used."""
 

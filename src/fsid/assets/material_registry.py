@@ -26,9 +26,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fsid.assets.bake_cache import cached, code_key, content_key
+from fsid.assets.file_names import PREFIX
 from fsid.assets.maps import MaterialMaps
 from fsid.assets.streams import rng_of
-from fsid.assets.textures import PREFIX, TILE_M, bake_texture, texture_key
+from fsid.assets.textures import TILE_M, bake_texture, texture_key
 from fsid.assets.triangle import PICTURE, Triple, encode, hex_colours, srgb_to_linear
 from fsid.errors import FsidError
 

@@ -21,9 +21,10 @@ from functools import cache, lru_cache
 
 import numpy as np
 
+from fsid.assets.file_names import PREFIX
 from fsid.assets.mesh import Mesh
 from fsid.assets.solids import Solid, assemble
-from fsid.assets.sources import PREFIX, load_source
+from fsid.assets.sources import load_source
 from fsid.assets.streams import rng_of
 from fsid.errors import FsidError
 

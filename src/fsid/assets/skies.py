@@ -13,7 +13,7 @@ import re
 from pathlib import Path
 
 from fsid.assets.exr import stated_size, stated_values
-from fsid.assets.file_names import NOT_TEXT, shown
+from fsid.assets.file_names import NOT_TEXT, PREFIX, shown
 from fsid.assets.survey import Skipped, Survey, surveyed
 from fsid.errors import FsidError
 
@@ -48,9 +48,9 @@ def _survey(folder: str) -> tuple[list[str], list[Skipped]]:
     for path in sorted(path for path in files if path.suffix.lower() in SKY_SUFFIXES):
         reason = _flaw(path)
         if reason:
-            skipped.append((shown(f"file:{path}"), reason))
+            skipped.append((shown(f"{PREFIX}{path}"), reason))
         else:
-            usable.append(f"file:{path}")
+            usable.append(f"{PREFIX}{path}")
     return usable, skipped
 
 

@@ -21,7 +21,7 @@ import numpy as np
 from scipy.fft import irfft2, rfft2
 
 from fsid.assets.bake_cache import cached, code_key, content_key
-from fsid.assets.file_names import NOT_TEXT, shown
+from fsid.assets.file_names import NOT_TEXT, PREFIX, shown
 from fsid.assets.maps import MaterialMaps
 from fsid.assets.survey import Skipped, Survey, surveyed
 from fsid.assets.texture_files import (
@@ -39,7 +39,6 @@ from fsid.assets.texture_files import (
 from fsid.assets.triangle import Triple, enclosing, encode, srgb_to_linear
 from fsid.errors import FsidError
 
-PREFIX = "file:"
 TILE_M = 1.0
 """Natural width of a tile: no file says it, and most photographed textures are one or two metres wide."""
 

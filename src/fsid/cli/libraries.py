@@ -36,7 +36,7 @@ def read_libraries(config: SceneConfig, *, quiet: bool) -> None:
 
 def _tell(found: str, skipped: Sequence[tuple[str, str]], *, quiet: bool) -> None:
     """Nothing where nothing was skipped."""
-    from fsid.assets.sources import PREFIX
+    from fsid.assets.file_names import PREFIX
 
     if skipped:
         name, reason = skipped[0]

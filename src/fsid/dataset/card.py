@@ -20,6 +20,7 @@ import numpy as np
 from PIL import Image
 
 from fsid import __version__
+from fsid.assets.file_names import PREFIX
 from fsid.assets.sources import survey_meshes
 from fsid.counted import counted
 from fsid.dataset.config import DatasetConfig
@@ -157,7 +158,7 @@ def _sources(tally: _Tally) -> Iterable[str]:
     names = {"mesh": "meshes", "material": "materials", "sky": "skies"}
     for what, name in names.items():
         used = tally.counts.get(what, Counter())
-        own = Counter({key: n for key, n in used.items() if not key.startswith("file:")})
+        own = Counter({key: n for key, n in used.items() if not key.startswith(PREFIX)})
         if own:
             yield f"- FSID's own {name} (Apache-2.0, made by formula): {_listed(own, 'uses')}."
         for folder, n in sorted(Counter(_folder(key) for key in (used - own).elements()).items()):
@@ -184,7 +185,7 @@ def _statistics(out: Path) -> Iterable[str]:
 
 def _folder(source: str) -> str:
     """The folder or library of a "file:PATH" or "file:PATH!MEMBER"."""
-    path, _, member = source.removeprefix("file:").partition("!")
+    path, _, member = source.removeprefix(PREFIX).partition("!")
     return path if member else str(Path(path).parent)
 
 

@@ -16,7 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from fsid.assets import mesh_sources, sky_sources
-from fsid.assets.sources import PREFIX, split_source
+from fsid.assets.file_names import PREFIX
+from fsid.assets.sources import split_source
 from fsid.assets.textures import texture_files
 from fsid.dataset.config import DatasetConfig, GenerateConfig
 from fsid.dataset.pictures import find_pictures, pictures_digest

@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fsid.assets.file_names import PREFIX
 from fsid.assets.skies import XYZE, exr_size, size_flaw, sky_sources
 from fsid.counted import counted
 from fsid.errors import FsidError, refuse_any
@@ -50,7 +51,7 @@ def check_skies(folder: str, progress: Callable[[int, int], None] = lambda done,
     sources, faults = sky_sources(folder), []
     for done, source in enumerate(sources, 1):
         try:
-            _decoded(Path(source.removeprefix("file:")))
+            _decoded(Path(source.removeprefix(PREFIX)))
         except FsidError as error:
             faults.append(str(error))
         progress(done, len(sources))
@@ -66,8 +67,8 @@ def _drawn(sky: Sky) -> np.ndarray:
 
 
 def _pictured(sky: Sky) -> np.ndarray:
-    if sky.source.startswith("file:"):
-        path = Path(sky.source.removeprefix("file:"))
+    if sky.source.startswith(PREFIX):
+        path = Path(sky.source.removeprefix(PREFIX))
         try:
             state = path.stat()
         except OSError as error:

@@ -17,6 +17,7 @@ from fsid.assets import (
     material_tile_m,
     part_kind,
 )
+from fsid.assets.file_names import PREFIX
 from fsid.scene.choice import log_uniform_rand, pick_rand, share_rand
 from fsid.scene.colour import PALETTES, Mood, albedo_rgb, calmed, lab_rand, mood_rand, related_rand
 from fsid.scene.config import SceneConfig
@@ -24,7 +25,7 @@ from fsid.scene.knobs import Range
 from fsid.scene.lobes import lobes_rand
 from fsid.scene.model import Material, Vec3
 from fsid.scene.pools import OFTEN_PLAIN, POOLS, WITHOUT_ORDER
-from fsid.scene.sources import FILE, Names, texture_rand
+from fsid.scene.sources import Names, texture_rand
 from fsid.scene.vectors import vec3
 
 PLAIN_FAMILY = "paint"
@@ -67,7 +68,7 @@ def material_rand(
     plain, family = rng.random() < config.materials.plain_share, texture_rand(rng, config)
     pool = pools.get(part_kind(part_name) or "", ())
     pool = tuple(name for name in pool if name in (config.material_families or pool))
-    if pool and not family.startswith(FILE):
+    if pool and not family.startswith(PREFIX):
         plain, family = False, pick_rand(rng, pool)
     material = _finished_rand(
         rng,
@@ -87,7 +88,7 @@ def surface_rand(rng: np.random.Generator, config: SceneConfig, mood: Mood, surf
     known = config.material_families or material_families()
     pool = tuple(name for name in POOLS[surface] if name in known) or known
     common = pick_rand(rng, pool)
-    if rng.random() < config.background.pool_share and not family.startswith(FILE):
+    if rng.random() < config.background.pool_share and not family.startswith(PREFIX):
         family = common
     family = PLAIN_FAMILY if plain else family
     material = _finished_rand(rng, config, mood, family, config.background.tile_scale)
@@ -110,7 +111,7 @@ def _finished_rand(
     variant = int(rng.integers(MATERIAL_VARIANTS))
     layered, layer = rng.random() < knobs.layer_share, pick_rand(rng, material_layers())
     natural, colours = rng.random() < knobs.natural_share, _colours_rand(rng, config, mood)
-    from_file = family.startswith(FILE)
+    from_file = family.startswith(PREFIX)
     known = _colours_of(family, variant) if natural or in_nature or from_file else None
     own = np.array(known or colours)
     a, b, c = own if from_file else calmed(own, mood.variation)

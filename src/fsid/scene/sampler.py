@@ -21,6 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fsid.assets import build_mesh
+from fsid.assets.file_names import PREFIX
 from fsid.errors import FsidError, check_kind, whole
 from fsid.scene.choice import pick_rand
 from fsid.scene.colour import Mood
@@ -31,7 +32,7 @@ from fsid.scene.materials import PLAIN, cast_rand, material_rand
 from fsid.scene.model import Background, Camera, Material, Object, Scene, Transform
 from fsid.scene.placement import arranged, scattered
 from fsid.scene.pools import GROWN, NATURE
-from fsid.scene.sources import FILE, mesh_rand, sky_rand
+from fsid.scene.sources import mesh_rand, sky_rand
 from fsid.scene.surroundings import Space, background_rand, space_of
 from fsid.scene.view import burst_rand, camera_rand, motions_rand, rig_rand
 
@@ -131,7 +132,7 @@ def _grown_rand(
             rng = np.random.default_rng(child)
             wild, family = rng.random() < config.nature_share, pick_rand(rng, NATURE)
             known = not config.mesh_families or family in config.mesh_families
-            out[S] = Object(family, S.seed) if wild and known and not S.family.startswith(FILE) else S
+            out[S] = Object(family, S.seed) if wild and known and not S.family.startswith(PREFIX) else S
     return tuple(out[S] for S in objects)
 
 

@@ -13,10 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from fsid.assets import material_families, mesh_families, mesh_sources, sky_sources, texture_sources
+from fsid.assets.file_names import PREFIX
 from fsid.scene.choice import pick_rand
 from fsid.scene.config import SceneConfig
-
-FILE = "file:"
 
 Names = tuple[str, ...]
 
@@ -69,7 +68,7 @@ def _catalogue(folders: Names, find: Callable[[str], Names]) -> tuple[Names, Nam
 
 def _label(name: str, folder: str) -> str:
     """The path inside the folder, with the separator in front."""
-    path, place = name.removeprefix(FILE), str(Path(folder))
+    path, place = name.removeprefix(PREFIX), str(Path(folder))
     return f"/{path}" if place == "." else path.removeprefix(place)
 
 

@@ -1,7 +1,6 @@
 """Meshes that the user brings: folders of files and Sweet Home 3D libraries, as if they were families."""
 
 from fsid.assets.sources.library import (
-    PREFIX,
     MeshSource,
     load_source,
     mesh_sources,
@@ -9,4 +8,4 @@ from fsid.assets.sources.library import (
     survey_meshes,
 )
 
-__all__ = ["PREFIX", "MeshSource", "load_source", "mesh_sources", "split_source", "survey_meshes"]
+__all__ = ["MeshSource", "load_source", "mesh_sources", "split_source", "survey_meshes"]

@@ -20,7 +20,7 @@ from urllib.parse import unquote
 
 import numpy as np
 
-from fsid.assets.file_names import NOT_TEXT, shown
+from fsid.assets.file_names import NOT_TEXT, PREFIX, shown
 from fsid.assets.mesh import Mesh
 from fsid.assets.sources.cache import (
     cache_key,
@@ -37,9 +37,6 @@ from fsid.assets.sources.limits import MAX_FILE_BYTES, MAX_LICENCE_LETTERS, NotN
 from fsid.assets.sources.reading import MESH_SUFFIXES, read_triangles
 from fsid.assets.survey import Skipped, Survey, surveyed
 from fsid.errors import FsidError
-
-PREFIX = "file:"
-"""What tells a mesh file from a procedural family in `Object.family`."""
 
 LIBRARY_SUFFIX = ".sh3f"
 _CC0 = re.compile(r"\bcc[ -]?(?:0|zero)\b|public[ -]domain|creativecommons\.org/publicdomain", re.IGNORECASE)
