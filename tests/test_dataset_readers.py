@@ -189,7 +189,7 @@ def test_the_card_shows_what_others_wrote_as_text() -> None:
 def test_licences_of_meshes_are_counted_by_use(tmp_path: Path) -> None:
     import trimesh
 
-    folders = [tmp_path / name for name in ("a", "b")]
+    folders = [tmp_path / name for name in ("a", "b!c")]
     for folder in folders:
         folder.mkdir()
         trimesh.creation.box((0.3, 0.2, 0.1)).export(folder / "box.glb")
@@ -197,4 +197,4 @@ def test_licences_of_meshes_are_counted_by_use(tmp_path: Path) -> None:
     used = Counter({f"file:{folder / 'box.glb'}": n for folder, n in zip(folders, (3, 2), strict=True)})
     stated, unknown = _sources(_Tally({"mesh": used}))
     assert "3 uses. Licences: CC0 (3) uses." in stated
-    assert "2 uses. No licence file was found" in unknown
+    assert f"`{folders[1]}`: 2 uses. No licence file was found" in unknown

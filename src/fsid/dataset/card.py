@@ -21,7 +21,7 @@ from PIL import Image
 
 from fsid import __version__
 from fsid.assets.file_names import PREFIX
-from fsid.assets.sources import survey_meshes
+from fsid.assets.sources import split_source, survey_meshes
 from fsid.counted import counted
 from fsid.dataset.config import DatasetConfig
 from fsid.dataset.index import index_mosaics
@@ -185,8 +185,8 @@ def _statistics(out: Path) -> Iterable[str]:
 
 def _folder(source: str) -> str:
     """The folder or library of a "file:PATH" or "file:PATH!MEMBER"."""
-    path, _, member = source.removeprefix(PREFIX).partition("!")
-    return path if member else str(Path(path).parent)
+    path, member = split_source(source)
+    return str(path if member else path.parent)
 
 
 def _licence(what: str, place: Path, used: Counter[str]) -> str:
