@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fsid.evaluate.placing import unbanded
+from fsid.sensor.mosaic import TILE
 
 _PIXELS = 200_000
 """At most, of each frame: the end of the noise is then within 4 % of v for 50 frames."""
@@ -43,7 +44,7 @@ class Departure:
     @staticmethod
     def of(frame: np.ndarray) -> Departure:
         """Of a frame less the truth (H, W)."""
-        sites = [frame[row::2, column::2] for row in (0, 1) for column in (0, 1)]
+        sites = [frame[site] for site in TILE]
         pixels = np.concatenate([unbanded(site).ravel() for site in sites])
         rows, columns = (
             np.concatenate([site.mean(axis=axis) - site.mean() for site in sites]) for axis in (1, 0)

@@ -25,6 +25,7 @@ from fsid.evaluate.cut_off import before_cut_off
 from fsid.evaluate.placing import LEAST_FRAMES, Placed, Window, place, read_first, too_few
 from fsid.sensor import Raw, read_raw
 from fsid.sensor.dng import read_stored
+from fsid.sensor.mosaic import TILE
 
 OUTLIER_SIGMA = 4.0
 SPECK_SIGMA = 10.0
@@ -185,6 +186,6 @@ def _is_like_the_others(deviation: np.ndarray, variance: np.ndarray, frames: int
 def _mean_of_site(values: np.ndarray) -> np.ndarray:
     """Averages over neighbours of the same CFA site: a pixel's own variance is from too few frames."""
     out = np.empty_like(values)
-    for row, column in ((0, 0), (0, 1), (1, 0), (1, 1)):
-        out[row::2, column::2] = uniform_filter(values[row::2, column::2], _PATCH_TILES, mode="reflect")
+    for site in TILE:
+        out[site] = uniform_filter(values[site], _PATCH_TILES, mode="reflect")
     return np.maximum(out, 0)

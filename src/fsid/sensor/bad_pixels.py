@@ -13,7 +13,7 @@ import struct
 import numpy as np
 from scipy.ndimage import convolve
 
-from fsid.sensor.defects import TILE
+from fsid.sensor.mosaic import TILE
 
 _CONSTANT, _LIST = 4, 5
 _MAX_OPCODES = 1 << 10

@@ -10,8 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from fsid.sensor.mosaic import TILE
+
 FAR = 10.0  # robust standard deviations: a defective pixel
-TILE = tuple(np.s_[row::2, column::2] for row in (0, 1) for column in (0, 1))  # sites, whatever their colour
 GAUSS_MAD = 0.6745  # median absolute deviation of a standard normal number
 _AROUND = 5  # pixels of the same site, the side of a neighbourhood
 _LEAST_DN = 0.1  # sigma; means of a few integers may all be alike

@@ -23,7 +23,7 @@ from fsid.sensor.bare import BARE_SUFFIXES, Layout, check_bayer, check_white, re
 from fsid.sensor.black_levels import BlackLevels
 from fsid.sensor.defects import GAUSS_MAD
 from fsid.sensor.dng import RawHeader, read_header, read_stored
-from fsid.sensor.mosaic import check_cfa
+from fsid.sensor.mosaic import TILE, check_cfa
 from fsid.sensor.quantise import check_levels
 
 SAME_LIGHT, SAME_DN = 0.03, 0.5  # difference of the levels of two frames of one burst, relative or in DN
@@ -288,7 +288,7 @@ def _noise_dn(dn: np.ndarray) -> float:
 
 
 def _check_mono(path: Path, dn: np.ndarray) -> None:
-    sites = [float(dn[r::2, c::2].mean()) for r in (0, 1) for c in (0, 1)]
+    sites = [float(dn[site].mean()) for site in TILE]
     if max(sites) - min(sites) > _SITES_DIFFER * max(sites):
         raise FsidError(
             f"{path}: looks like a Bayer mosaic (its four sites differ); "

@@ -21,6 +21,8 @@ from fsid.sensor.raw import CFA_PATTERNS, Raw, check_even
 
 SITES = ("R", "Gr", "Gb", "B")
 SITE_CHANNEL = (0, 1, 1, 2)  # RGB channel of each packed site
+TILE = tuple(np.s_[row::2, column::2] for row in (0, 1) for column in (0, 1))
+"""The pixels of each place in the tile, row by row, whatever their colour."""
 
 
 def check_cfa(cfa: str, where: str = "cfa") -> str:

@@ -24,9 +24,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fsid.errors import FsidError
-from fsid.sensor.defects import TILE
 from fsid.sensor.light_change import MAX_CLIPPED_SHARE, MIN_BLOCKS, SIGNIFICANT, Blocks, gain_and_offset
-from fsid.sensor.mosaic import site_offsets
+from fsid.sensor.mosaic import TILE, site_offsets
 from fsid.sensor.quantise import MAX_DN, ROUNDING_DN2
 
 LARGEST_FLICKER = 0.1  # of the light; beyond it this is another exposure, and its noise another noise
