@@ -18,7 +18,6 @@ from fsid.dataset import (
     generate,
     make_sample,
     save_png,
-    scene_of,
 )
 from fsid.errors import FsidError
 from fsid.evaluate import (
@@ -86,7 +85,7 @@ MISTAKES: dict[str, tuple[Callable[[], object], str]] = {
     "half a width": (lambda: sample(SceneConfig(), 0, width=128 / 2), "width: 64.0 is not a whole number"),
     "a dict for settings of scenes": (lambda: sample({"objects": (2, 3)}, 0), "a dict is no SceneConfig"),
     "a name for settings": (
-        lambda: scene_of("fsid-175k", 0, 0),
+        lambda: make_sample("fsid-175k", 0, 0, None),
         "a str is no GenerateConfig: generate_config",
     ),
     "an index of 1e3": (lambda: make_sample(GenerateConfig(), 0, 1e3, None), "index: 1000.0 is not a whole"),

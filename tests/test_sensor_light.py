@@ -7,7 +7,7 @@ import pytest
 
 from fsid.errors import FsidError
 from fsid.evaluate import photo_testset
-from fsid.sensor import NoiseTerms, Raw, dimmed, light_level, load_profile, read_raw, save_profile
+from fsid.sensor import NoiseTerms, light_level, load_profile, read_raw, save_profile
 from fsid.sensor.light import KEY, LONGEST_EXPOSURE_S, PHOTONS_PER_LUX_M2_S, electrons_per_second
 
 PIXEL = load_profile("pixel6")
@@ -37,7 +37,7 @@ def test_time_comes_before_iso_and_iso_before_darkness():
     assert np.all(np.diff(signals) >= -1e-9)
     assert np.all((isos < 49.01) | (times == 0.1))
     assert np.all((signals > KEY * 0.999) | (isos > 4 * 3199 * 0.999))
-    assert levels[-1].dimming == pytest.approx(1)
+    assert levels[-1].signal == pytest.approx(KEY)
 
 
 def test_half_a_lux_with_a_pixel_6():
@@ -49,13 +49,6 @@ def test_half_a_lux_with_a_pixel_6():
     assert level.signal == pytest.approx(level.electrons * (k[1] + k[2]) / 2)
     half = light_level(PIXEL, 0.5, longest_exposure_s=0.05)
     assert half.electrons == pytest.approx(level.electrons / 2)
-
-
-def test_a_dimmed_image_has_the_electrons_of_its_light():
-    level = light_level(PIXEL, 0.1)
-    raw = Raw(np.full((4, 4), KEY, np.float32), "GBRG", 64, 1023, (2, 1, 1.5), np.eye(3))
-    np.testing.assert_allclose(dimmed(raw, level).mosaic, level.signal, rtol=1e-6)
-    assert dimmed(raw, level).iso == level.iso
 
 
 def test_the_test_bench_takes_lux(photos, tmp_path):
@@ -106,6 +99,4 @@ def test_what_cannot_be_computed_is_named(tmp_path):
 def test_no_shutter_is_faster_than_a_hundred_thousandth():
     level = light_level(PIXEL, 1e8)
     assert level.exposure_s == pytest.approx(1e-5)
-    assert level.dimming > 1
-    grey = Raw(np.full((4, 4), 0.5, np.float32), "RGGB", 0, 1023, (1.0, 1.0, 1.0), np.eye(3))
-    assert dimmed(grey, level).mosaic.max() == 1
+    assert level.signal > KEY

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from fsid.errors import FsidError
-from fsid.sensor import CFA_PATTERNS, Raw, bayer_crop, bayer_flip, mosaic, pack, unpack
+from fsid.sensor import CFA_PATTERNS, Raw, bayer_crop, mosaic, pack, unpack
 from fsid.sensor.mosaic import halved, shift_cfa, site_offsets
 
 cfas = st.sampled_from(CFA_PATTERNS)
@@ -55,24 +55,6 @@ def test_crop_at_any_offset_keeps_every_pixels_colour(cfa, top, left):
     np.testing.assert_array_equal(cut.mosaic, mosaic(_colours(6, 4), cut.cfa))
     assert cut.cfa == shift_cfa(cfa, top, left)
     assert (cut.cfa == cfa) == (top % 2 == 0 and left % 2 == 0)
-
-
-@given(cfas, st.booleans(), st.booleans())
-def test_flip_keeps_every_pixels_colour_and_twice_is_nothing(cfa, vertical, horizontal):
-    image = mosaic(_colours(6, 8) + np.arange(8)[:, None] * 10, cfa)
-    flipped = bayer_flip(_raw(image, cfa), vertical, horizontal)
-    np.testing.assert_array_equal(flipped.mosaic % 10, mosaic(_colours(6, 8), flipped.cfa))
-    again = bayer_flip(flipped, vertical, horizontal)
-    assert again.cfa == cfa
-    np.testing.assert_array_equal(again.mosaic, image)
-
-
-@settings(max_examples=20)
-@given(cfas, st.booleans(), st.booleans())
-def test_flip_keeps_gr_apart_from_gb(cfa, vertical, horizontal):
-    sites = np.broadcast_to(np.arange(4, dtype=np.float32)[:, None, None], (4, 3, 4))
-    flipped = bayer_flip(_raw(unpack(sites, cfa), cfa), vertical, horizontal)
-    np.testing.assert_array_equal(pack(flipped.mosaic, flipped.cfa), sites)
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from fsid.dataset.only import make_only
 from fsid.dataset.photos import find_photos, read_photo
 from fsid.dataset.picture import check_png, contact_sheet, grid, save_png
 from fsid.dataset.pictures import check_pictures, find_pictures
-from fsid.dataset.sample import encode, make_frame, make_sample, remake, scene_of, to_uint8
+from fsid.dataset.sample import encode, make_frame, make_sample, remake, to_uint8
 from fsid.dataset.shards import find_shards, read_member, shard_keys, shard_path, write_shard
 from fsid.dataset.worker import rendering
 
@@ -52,7 +52,6 @@ __all__ = [
     "rendering",
     "sample_key",
     "save_png",
-    "scene_of",
     "shard_keys",
     "shard_path",
     "to_uint8",

@@ -21,16 +21,11 @@ from fsid.dataset.attempt import Attempt, Sample, sample_key
 from fsid.dataset.config import GenerateConfig
 from fsid.dataset.tasks import SceneRenderer
 from fsid.errors import FsidError, check_kind, whole
-from fsid.scene import Scene, scene_from_json
+from fsid.scene import scene_from_json
 from fsid.sensor import Raw, clean_levels, develop, write_dng
 
 ATTEMPTS = 8
 _SAME_NOISE = 1e-6  # relative: a machine may round otherwise
-
-
-def scene_of(config: GenerateConfig, seed: int, index: int) -> Scene:
-    """The scene of sample `index` (of its first attempt, which the checks seldom refuse)."""
-    return Attempt(config, seed, _place_of(config, index)[0]).drawn_scene()
 
 
 def make_sample(config: GenerateConfig, seed: int, index: int, renderer: SceneRenderer | None) -> Sample:
@@ -39,17 +34,12 @@ def make_sample(config: GenerateConfig, seed: int, index: int, renderer: SceneRe
     renderer: that of `rendering(config)`, whose settings are the configuration's; other ones make another
     picture. None where `config.images` names a folder of pictures. FsidError as in `make_frame`.
     """
-    frame, place = _place_of(config, index)
-    return make_frame(config, seed, frame, renderer)[place]
-
-
-def _place_of(config: GenerateConfig, index: int) -> tuple[int, int]:
-    """The frame of a sample, and which of its samples it is."""
     check_kind(config, GenerateConfig, "generate_config makes one of a file, a name or settings")
     index = whole(index, "index")
     if index < 0:
         raise FsidError(f"index {index}: must not be negative")
-    return divmod(index, config.pairs_per_frame)
+    frame, place = divmod(index, config.pairs_per_frame)
+    return make_frame(config, seed, frame, renderer)[place]
 
 
 def make_frame(

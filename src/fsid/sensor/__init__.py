@@ -12,8 +12,8 @@ from fsid.sensor.dng import dng_pixel_offset, read_raw, write_dng
 from fsid.sensor.exposure import expose, exposure_rand
 from fsid.sensor.fitted_profile import profile_of
 from fsid.sensor.hot_pixels import hot_pixels, without_hot_pixels
-from fsid.sensor.light import LightLevel, dimmed, light_level
-from fsid.sensor.mosaic import bayer_crop, bayer_flip, mosaic, pack, unpack
+from fsid.sensor.light import LightLevel, light_level
+from fsid.sensor.mosaic import bayer_crop, mosaic, pack, unpack
 from fsid.sensor.noise import add_noise, level_rand, variance
 from fsid.sensor.pairs import clean_from_frame, clean_from_linear, clean_from_photo, noisy_from_clean
 from fsid.sensor.profiles import (
@@ -45,7 +45,6 @@ __all__ = [
     "add_noise",
     "add_noise_terms",
     "bayer_crop",
-    "bayer_flip",
     "calibrate",
     "camera_to_srgb_matrix",
     "clean_from_frame",
@@ -56,7 +55,6 @@ __all__ = [
     "demosaic",
     "develop",
     "develop_linear",
-    "dimmed",
     "dng_pixel_offset",
     "estimate_noise",
     "exact_levels",

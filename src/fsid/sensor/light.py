@@ -16,11 +16,10 @@ its filter, lens transmittance 0.9, no vignetting, no flare. Each may be wrong b
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from fsid.errors import FsidError
 from fsid.sensor.camera_profile import CameraProfile
-from fsid.sensor.raw import Raw
 
 PHOTONS_PER_LUX_M2_S = 6.02214e23 * 1e-6 / 54
 GREY = 0.18
@@ -33,9 +32,8 @@ _HALVINGS = 60
 
 @dataclass(frozen=True)
 class LightLevel:
-    """What the camera sets and gets. electrons: of a mid-grey at a green pixel. signal: the same as x.
-
-    dimming: signal over `KEY`, 1 unless the light is too low for the highest ISO (or too bright).
+    """What the camera sets and gets. electrons: of a mid-grey at a green pixel. signal: the same as x, `KEY`
+    unless the light is too low for the highest ISO (or too bright).
     """
 
     lux: float
@@ -43,11 +41,6 @@ class LightLevel:
     iso: float
     electrons: float
     signal: float
-
-    @property
-    def dimming(self) -> float:
-        """Factor from a well exposed image to this one."""
-        return self.signal / KEY
 
 
 def light_level(
@@ -92,11 +85,6 @@ def electrons_per_second(profile: CameraProfile, lux: float, reflectance: float 
     on_sensor = lux * reflectance * optics.transmittance / (4 * optics.f_number**2)
     area_m2 = (optics.pixel_pitch_um * 1e-6) ** 2
     return on_sensor * PHOTONS_PER_LUX_M2_S * area_m2 * optics.quantum_efficiency
-
-
-def dimmed(clean: Raw, level: LightLevel) -> Raw:
-    """A well exposed clean image as the camera gets it at `level`; brighter than saturation is clipped."""
-    return replace(clean, mosaic=(clean.mosaic * level.dimming).clip(max=1.0), iso=level.iso)
 
 
 def _gain(profile: CameraProfile, iso: float) -> float:

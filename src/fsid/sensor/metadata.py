@@ -85,7 +85,7 @@ class Metadata:
         return replace(self, mosaic=tuple(fitting if t.code == CROP_SIZE else t for t in self.mosaic))
 
     def without_geometry(self) -> Metadata:
-        """The same for an image that was cropped or mirrored: crop and lens corrections are off."""
+        """The same for an image that was cropped: crop and lens corrections are off."""
         return Metadata(self.first, tuple(t for t in self.mosaic if t.code not in _GEOMETRY), self.exif)
 
 

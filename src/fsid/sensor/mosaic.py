@@ -109,16 +109,3 @@ def bayer_crop(raw: Raw, top: int, left: int, height: int, width: int) -> Raw:
     return replace(
         raw, mosaic=cut, cfa=shift_cfa(raw.cfa, top, left), metadata=raw.metadata.without_geometry()
     )
-
-
-def bayer_flip(raw: Raw, vertical: bool, horizontal: bool) -> Raw:
-    """Mirror the image; no pixel changes its colour, so the pattern of the result is mirrored too.
-
-    Rows stay rows, so Gr stays Gr and the noise level of the image stays true. To keep the pattern of
-    `raw`, crop one pixel off both ends of the mirrored axis (Liu et al. 2019, Bayer-preserving augmentation).
-    """
-    flipped = raw.mosaic[:: -1 if vertical else 1, :: -1 if horizontal else 1]
-    cfa = shift_cfa(raw.cfa, int(vertical), int(horizontal))
-    return replace(
-        raw, mosaic=np.ascontiguousarray(flipped), cfa=cfa, metadata=raw.metadata.without_geometry()
-    )
