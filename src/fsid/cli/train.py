@@ -11,6 +11,7 @@ from tyro.conf import Positional
 
 from fsid.cli.arguments import Output
 from fsid.cli.iso_notes import note_extrapolation
+from fsid.cli.notes import note
 from fsid.errors import FsidError
 from fsid.terminal import Terminal
 
@@ -50,13 +51,9 @@ def train(
     is_main = os.environ.get("RANK", "0") == "0"
     note_extrapolation(settings.profiles, settings.iso_min, settings.iso_max, quiet=quiet or not is_main)
     task = task_of(data)
-    if task != "denoise" and is_main and not quiet:
-        Terminal(stderr=True).print(
-            f"note: {data} holds pairs for {task}, but this trains a denoiser: "
-            "it takes their clean images alone and draws noise for them",
-            soft_wrap=True,
-            markup=False,
-        )
+    if task != "denoise":
+        line = f"{data} holds pairs for {task}, but this trains a denoiser: it takes their clean images alone"
+        note(f"{line} and draws noise for them", quiet=quiet or not is_main)
     command = shlex.join(["fsid", *sys.argv[1:]])
     model = train_network(data, output, settings, resume=resume, quiet=quiet, command=command)
     if not quiet and is_main:
