@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fsid.dataset import to_uint8
 from fsid.sensor import Raw, develop, pack, unpack
 
 PREVIEW_PX = 1024  # longest side
@@ -25,5 +26,4 @@ def preview_of(raw: Raw) -> np.ndarray | None:
     if min(height, width) < 2:
         return None
     cells = packed[:, : height * factor, : width * factor].reshape(4, height, factor, width, factor)
-    small = develop(replace(raw, mosaic=unpack(cells.mean((2, 4)), raw.cfa)))
-    return np.rint(small.clip(0, 1) * 255).astype(np.uint8)
+    return to_uint8(develop(replace(raw, mosaic=unpack(cells.mean((2, 4)), raw.cfa))))
