@@ -16,8 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
-from fsid.dataset import save_png, to_uint8
-from fsid.errors import FsidError
+from fsid.dataset import save_png
+from fsid.files import make_folder
 
 RADIUS_PX = (2.0, 400.0)
 OVERSAMPLING = 2
@@ -55,18 +55,14 @@ def write_dead_leaves(
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> None:
     """Pictures 0 .. count-1 as PNG files; those that are there already are kept."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for i in range(count):
-            progress(i, count)
-            path = folder / f"{i:06d}.png"
-            if path.exists():
-                continue
+    make_folder(folder)
+    for i in range(count):
+        progress(i, count)
+        path = folder / f"{i:06d}.png"
+        if not path.exists():
             rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(i,)))
-            save_png(path, to_uint8(dead_leaves_rand(rng, height, width)))
-        progress(count, count)
-    except OSError as error:
-        raise FsidError(f"{folder}: cannot be written ({error.strerror})") from None
+            save_png(path, dead_leaves_rand(rng, height, width))
+    progress(count, count)
 
 
 def _put(
