@@ -104,7 +104,7 @@ def _set_table(rows: Sequence[Row], set_name: str) -> Table:
         if found[method, level].psnr_raw == max(found[m, level].psnr_raw for m in methods)
     }
     count = next(row.n for row in found.values())
-    title = f"{set_name}, {count} image{'s' if count > 1 else ''}"
+    title = f"{set_name}, {counted(count, 'image')}"
     return Table(title, ("", *map(level_label, levels)), body, frozenset(best))
 
 
