@@ -22,8 +22,8 @@ from fsid.files import read_whole
 from fsid.sensor import NoiseLevel
 
 CARD_KEY = "fsid_card"
-INPUTS = {"noisy", "k", "sigma2", "averages", "frozen"}
-OUTPUTS = {"clean", "averages_out"}
+INPUTS = ("noisy", "k", "sigma2", "averages", "frozen")  # in this order
+OUTPUTS = ("clean", "averages_out")
 _MOST_BYTES = 2 << 30  # of an ONNX file, by its format
 
 
@@ -84,7 +84,8 @@ def onnx_denoiser(graph: bytes, source: str, *, threads: int = 0) -> OnnxDenoise
         raise FsidError(f"{source}: is not a network that onnxruntime can read ({_line(error)})") from None
     text = session.get_modelmeta().custom_metadata_map.get(CARD_KEY)
     given = {value.name for value in (*session.get_inputs(), *session.get_overridable_initializers())}
-    if text is None or given != INPUTS or {value.name for value in session.get_outputs()} != OUTPUTS:
+    made = {value.name for value in session.get_outputs()}
+    if text is None or given != {*INPUTS} or made != {*OUTPUTS}:
         raise FsidError(f"{source}: is not a file of `fsid export`")
     return OnnxDenoiser(session, parse_card(text, source), source)
 

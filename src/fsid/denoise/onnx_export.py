@@ -26,7 +26,7 @@ from torch import Tensor, nn
 from fsid.config import to_plain
 from fsid.denoise.model import Denoiser
 from fsid.denoise.nafnet import SpatialMean, spatial_means
-from fsid.denoise.onnx_denoiser import CARD_KEY
+from fsid.denoise.onnx_denoiser import CARD_KEY, INPUTS, OUTPUTS
 
 OPSET = 18
 _EXAMPLE_PX = 64
@@ -109,7 +109,6 @@ def onnx_model(denoiser: Denoiser, *, half: bool = False) -> Any:
         torch.zeros(sum(denoiser.attention_widths)),
         torch.zeros(()),
     )
-    names = ["noisy", "k", "sigma2", "averages", "frozen"]
     sides = {
         2: torch.export.Dim("height", min=2, max=_MAX_PX),
         3: torch.export.Dim("width", min=2, max=_MAX_PX),
@@ -120,13 +119,13 @@ def onnx_model(denoiser: Denoiser, *, half: bool = False) -> Any:
             example,
             dynamo=True,
             opset_version=OPSET,
-            input_names=names,
-            output_names=["clean", "averages_out"],
-            dynamic_shapes={name: sides if name == "noisy" else None for name in names},
+            input_names=INPUTS,
+            output_names=OUTPUTS,
+            dynamic_shapes={name: sides if name == "noisy" else None for name in INPUTS},
         )
     assert program is not None
     model = program.model_proto
-    for name, default in zip(names[3:], example[3:], strict=True):
+    for name, default in zip(INPUTS[3:], example[3:], strict=True):
         model.graph.initializer.append(onnx.numpy_helper.from_array(default.numpy(), name))
     return _described(model, denoiser)
 
