@@ -107,7 +107,7 @@ def box(size_x: float, size_y: float, size_z: float, bevel: float = 0.004, steps
     return Solid(vertices + np.array((0, 0, half[2])), directions, faces)
 
 
-def lathe(profile: Sequence[Sequence[float]], segments: int = 32, crease_deg: float = 35.0) -> Solid:
+def lathe(profile: Sequence[Sequence[float]], segments: int, crease_deg: float = 35.0) -> Solid:
     """Revolve a profile of (radius, z) points, ordered so that the outside is on its right going up."""
     points = np.asarray(profile, dtype=float)
     points = points[np.r_[True, np.hypot(*np.diff(points, axis=0).T) > 1e-7]]
@@ -132,14 +132,12 @@ def cone(bottom: float, top: float, height: float, bevel: float = 0.003, segment
     return lathe([(0, 0), *lower, *upper, (0, height)], segments)
 
 
-def sweep(path: np.ndarray, radius: float | np.ndarray, segments: int = 12, *, closed: bool = False) -> Solid:
+def sweep(path: np.ndarray, radius: float | np.ndarray, segments: int, *, closed: bool = False) -> Solid:
     """Tube of `radius` (scalar or one per point, metres) along `path` (n, 3); open ends get round caps."""
     return tubes(np.asarray(path, dtype=float)[None], radius, segments, closed=closed)
 
 
-def tubes(
-    paths: np.ndarray, radius: float | np.ndarray, segments: int = 12, *, closed: bool = False
-) -> Solid:
+def tubes(paths: np.ndarray, radius: float | np.ndarray, segments: int, *, closed: bool = False) -> Solid:
     """`sweep` along many `paths` (k, n, 3) at once; `radius` broadcasts to (k, n).
 
     Thin ones, of up to six segments, end in a point instead of a round cap.
@@ -183,7 +181,7 @@ def ball(radii: np.ndarray | float, level: int = 4) -> Solid:
     return Solid(vertices, smooth_normals(vertices, faces), faces)
 
 
-def ball_directions(level: int = 4) -> np.ndarray:
+def ball_directions(level: int) -> np.ndarray:
     """(V, 3) unit directions of the vertices of `ball`."""
     return icosphere(level)[0]
 

@@ -98,7 +98,7 @@ def write_card(
     dataset: DatasetConfig,
     shards: Sequence[Path],
     command: str,
-    read: Callable[[int], None] = lambda shards: None,
+    read: Callable[[int], None],
 ) -> None:
     """Write README.md and samples.png of the dataset in `out`. command: what made it, "" where unknown.
 

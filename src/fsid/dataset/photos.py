@@ -67,7 +67,7 @@ def read_photo(path: str | Path) -> np.ndarray:
     return pixels[:height, :width]
 
 
-def check_photo(path: str | Path, smallest_px: int = SMALLEST_PX) -> None:
+def check_photo(path: str | Path, smallest_px: int) -> None:
     """FsidError where `read_photo` has one, and for a photograph that shows nothing or is smaller.
 
     A JPEG takes a quarter of the time of `read_photo`, others little less.

@@ -81,7 +81,7 @@ def check_pictures(
 def picture_faults(
     pictures: Sequence[Path],
     threads: int,
-    progress: Callable[[int, int], None] = lambda done, total: None,
+    progress: Callable[[int, int], None],
     smallest_px: int = SMALLEST_PX,
 ) -> list[str]:
     """Decode every picture once; a line for each that `read_picture` refuses, or that shows nothing.

@@ -42,7 +42,7 @@ def part_path(path: Path) -> Path:
     return path.with_name(f".{path.name}.{socket.gethostname()}-{os.getpid()}.part")
 
 
-def remove_parts(folder: Path, unused_s: float = 0) -> None:
+def remove_parts(folder: Path, unused_s: float) -> None:
     """Remove what killed writers left in a dataset's folder, if nobody wrote to it for `unused_s` seconds.
 
     A writer that is alive after all fails, harmlessly.

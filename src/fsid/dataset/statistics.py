@@ -155,7 +155,7 @@ def _gradients(luma: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _patches(luma: np.ndarray) -> dict[str, np.ndarray]:
-    patches = _blocks(luma, PATCH_PX).reshape(-1, PATCH_PX**2)
+    patches = _patches_of(luma)
     std, mean = patches.std(axis=1), patches.mean(axis=1)
     return {
         "contrast": np.quantile(np.log10(std / np.maximum(mean, 0.02) + 1e-3), _LEVELS),
@@ -169,7 +169,7 @@ def _colours(image: np.ndarray) -> dict[str, np.ndarray]:
     counts = np.bincount((cells[..., 0] * 64 + cells[..., 1]).ravel(), minlength=4096)
     # grey lies in the middle of a cell: at a corner, hardly any colour would be the 2 bits of four cells
     code = (np.clip(lab / (12.5, 25.0, 25.0) + (0, 5.5, 5.5), 0, 15).astype(int) * (256, 16, 1)).sum(-1)
-    entropy = [_entropy(patch) for patch in _blocks(code, PATCH_PX).reshape(-1, PATCH_PX**2)]
+    entropy = [_entropy(patch) for patch in _patches_of(code)]
     red_green = image[..., 0] - image[..., 1]
     yellow_blue = (image[..., 0] + image[..., 1]) / 2 - image[..., 2]
     colourfulness = np.hypot(red_green.std(), yellow_blue.std()) + 0.3 * np.hypot(
@@ -190,7 +190,7 @@ def _colours(image: np.ndarray) -> dict[str, np.ndarray]:
 def _colour_scales(lab: np.ndarray) -> dict[str, np.ndarray]:
     """How much colour differs between patches, and within them: in photographs hue belongs to things and
     lightness to their texture."""
-    patches = np.stack([_blocks(lab[..., i], PATCH_PX).reshape(-1, PATCH_PX**2) for i in range(3)])
+    patches = np.stack([_patches_of(lab[..., i]) for i in range(3)])
     spread = np.sqrt(patches.mean(2)[1:].var(1).sum())
     light, *colour = patches.var(2)
     return {
@@ -205,15 +205,11 @@ def _entropy(codes: np.ndarray) -> float:
     return float(-(share * np.log2(share)).sum())
 
 
-def _blocks(plane: np.ndarray, size: int) -> np.ndarray:
-    """(n, size, size) blocks that tile the plane, the rest at the edge dropped."""
-    rows, columns = (n // size for n in plane.shape)
-    return (
-        plane[: rows * size, : columns * size]
-        .reshape(rows, size, columns, size)
-        .swapaxes(1, 2)
-        .reshape(-1, size, size)
-    )
+def _patches_of(plane: np.ndarray) -> np.ndarray:
+    """(n, PATCH_PX^2) patches that tile the plane, the rest at the edge dropped."""
+    rows, columns = (n // PATCH_PX for n in plane.shape)
+    tiles = plane[: rows * PATCH_PX, : columns * PATCH_PX].reshape(rows, PATCH_PX, columns, PATCH_PX)
+    return tiles.swapaxes(1, 2).reshape(-1, PATCH_PX**2)
 
 
 def _one(value: float) -> np.ndarray:

@@ -70,7 +70,7 @@ def find_raws(folder: str | Path, *, bare: bool = False) -> list[Path]:
     return raws
 
 
-def raws_inside(folder: Path, *, bare: bool = False) -> list[Path]:
+def raws_inside(folder: Path, *, bare: bool) -> list[Path]:
     """As `find_raws`, and none where there is none; FsidError where the folder cannot be read."""
     try:
         inside = sorted(path for path in folder.iterdir() if path.is_file())
@@ -79,7 +79,7 @@ def raws_inside(folder: Path, *, bare: bool = False) -> list[Path]:
     return [p for p in inside if p.suffix.lower() in _suffixes(bare) and not p.name.startswith(".")]
 
 
-def raws_below(folder: Path, *, bare: bool = False) -> list[Path]:
+def raws_below(folder: Path, *, bare: bool) -> list[Path]:
     """What `find_raws` leaves out: the RAW files in folders inside `folder`, hidden ones excepted."""
     files = (p for p in folder.glob("*/**/*") if p.suffix.lower() in _suffixes(bare) and p.is_file())
     return sorted(p for p in files if not any(n.startswith(".") for n in p.relative_to(folder).parts))

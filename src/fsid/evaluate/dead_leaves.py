@@ -22,6 +22,7 @@ from fsid.files import make_folder
 RADIUS_PX = (2.0, 400.0)
 OVERSAMPLING = 2
 SHADED_SHARE = 0.5
+_COLOURS = 256  # of a picture
 
 
 def dead_leaves_rand(rng: np.random.Generator, height: int, width: int) -> np.ndarray:
@@ -93,15 +94,15 @@ def _put(
     return int(new.sum())
 
 
-def _palette_rand(rng: np.random.Generator, size: int = 256) -> np.ndarray:
-    """(size, 3) sRGB-encoded colours of one picture: correlated channels around two hues.
+def _palette_rand(rng: np.random.Generator) -> np.ndarray:
+    """(_COLOURS, 3) sRGB-encoded colours of one picture: correlated channels around two hues.
 
     Contrast and lightness come out close to those of photographs, since a rival is worth nothing where it was
     not given a fair chance. What stays different (docs/results.md, Table 2): the power spectrum falls less,
     by -2.14 against -2.39, texture has more colour, and patches of a picture differ less in theirs.
     """
     hues = rng.normal(0, 0.25, (2, 3))
-    level = rng.normal(rng.uniform(0.25, 0.6), rng.uniform(0.04, 0.2), size).clip(0.02, 1)
-    share = rng.uniform(0, 1, (size, 1))
-    tint = hues[0] * share + hues[1] * (1 - share) + rng.normal(0, 0.04, (size, 3))
+    level = rng.normal(rng.uniform(0.25, 0.6), rng.uniform(0.04, 0.2), _COLOURS).clip(0.02, 1)
+    share = rng.uniform(0, 1, (_COLOURS, 1))
+    tint = hues[0] * share + hues[1] * (1 - share) + rng.normal(0, 0.04, (_COLOURS, 3))
     return np.clip(level[:, None] * (1 + tint - tint.mean(axis=1, keepdims=True)), 0.01, 1).astype(np.float32)

@@ -59,6 +59,7 @@ PHOTOGRAPHS = (
 CAMERA = "pixel6"
 ISOS = (800, 1600, 3200, 6400)
 CROP_LEVEL = "iso3200"
+_WINDOW_PX = 180  # side of the window of the scene that is shown
 
 ProgressBar = Callable[[str, str], AbstractContextManager[Callable[[int, int], None]]]
 
@@ -176,18 +177,18 @@ def _contact_sheet(data: Path) -> np.ndarray:
     return grid([np.asarray(stored_preview(shard, key).reduce(4)) for shard, key in _samples(data)])
 
 
-def _overview(out: Path, ours: Method, window_px: int = 180) -> np.ndarray:
+def _overview(out: Path, ours: Method) -> np.ndarray:
     """A scene; then a window of it as clean RAW, noisy RAW and denoised, all developed: (h, w, 3) uint8.
 
     The RAW files of the pair are left in `out`.
     """
-    shard, key = _pair_to_show(out / "data", window_px)
+    shard, key = _pair_to_show(out / "data")
     for name in ("clean", "noisy"):
         write_atomically(out / f"pair.{name}.dng", read_member(shard, f"{key}.{name}.dng"))
     clean, noisy = (read_raw(out / f"pair.{name}.dng") for name in ("clean", "noisy"))
     scene, *others = (develop(raw) for raw in (clean, noisy, ours.denoise(noisy)))
-    window, _ = detailed_window(scene, window_px)
-    scale = max(1, scene.shape[0] // window_px)
+    window, _ = detailed_window(scene, _WINDOW_PX)
+    scale = max(1, scene.shape[0] // _WINDOW_PX)
     windows = [image[window].repeat(scale, 0).repeat(scale, 1) for image in (scene, *others)]
     rows = len(windows[0])
     gap = np.ones((rows, 8, 3), np.float32)
@@ -195,14 +196,14 @@ def _overview(out: Path, ours: Method, window_px: int = 180) -> np.ndarray:
     return to_uint8(np.hstack([scene[top : top + rows], gap, windows[0], gap, windows[1], gap, windows[2]]))
 
 
-def _pair_to_show(data: Path, window_px: int) -> tuple[Path, str]:
+def _pair_to_show(data: Path) -> tuple[Path, str]:
     """Of the eight noisiest pairs the one of middling detail: noise shows on things, not in gravel."""
 
     def iso(sample: tuple[Path, str]) -> float:
         return json.loads(read_member(sample[0], f"{sample[1]}.json"))["iso"]
 
     def detail(sample: tuple[Path, str]) -> float:
-        return detailed_window(np.asarray(stored_preview(*sample)) / 255, window_px)[1]
+        return detailed_window(np.asarray(stored_preview(*sample)) / 255, _WINDOW_PX)[1]
 
     noisiest = sorted(sorted(_samples(data), key=iso)[-8:], key=detail)
     return noisiest[len(noisiest) // 2]

@@ -39,10 +39,10 @@ class Layer:
     metallic: float
 
 
-def fitting_size(size: int, materials: int, budget_bytes: int = BUDGET_BYTES) -> int:
+def fitting_size(size: int, materials: int) -> int:
     """Texels per side at which all materials of a scene fit the budget, at most `size`: a scene of many
     materials has smaller ones, whatever was rendered before it."""
-    while size > _SMALLEST and materials * _layer_bytes(size) > budget_bytes:
+    while size > _SMALLEST and materials * _layer_bytes(size) > BUDGET_BYTES:
         size //= 2
     return size
 

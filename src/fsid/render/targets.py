@@ -212,7 +212,7 @@ class Targets:
         depth[depth <= 0] = np.inf
         return radiance, depth
 
-    def read_frame(self, *, labels: bool = True) -> Frame:
+    def read_frame(self, *, labels: bool) -> Frame:
         """The result, row 0 at the top. labels: False leaves all but radiance and depth without pixels."""
         radiance, depth = self.read_radiance()
         height, width = depth.shape if labels else (0, 0)

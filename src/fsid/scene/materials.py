@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
-from types import MappingProxyType
 
 import numpy as np
 
@@ -59,7 +58,7 @@ def material_rand(
     config: SceneConfig,
     mood: Mood,
     part_name: str,
-    pools: Mapping[str, Names] = MappingProxyType({}),
+    pools: Mapping[str, Names],
 ) -> Material:
     """The material of an object's part; its name may say what it is made of (`fsid.assets.part_kind`).
 

@@ -31,7 +31,7 @@ _VERSION = 4
 """One more whenever the same file gives another mesh."""
 
 
-def cache_key(path: Path, member: str, referred: Sequence[Path] = ()) -> str:
+def cache_key(path: Path, member: str, referred: Sequence[Path]) -> str:
     """Name of what is made from a file, and from those that it refers to, as they are now. OSError where
     there is none; the others may be missing."""
     text = "|".join(
