@@ -44,7 +44,7 @@ from fsid.evaluate.comparison_report import comparison_sections
 from fsid.evaluate.models import model_method
 from fsid.evaluate.plots import loss_plot, noise_profile_plot
 from fsid.evaluate.report import Section, picture, write_report
-from fsid.evaluate.testset import photo_testset
+from fsid.evaluate.testset import TESTSET_FILE, photo_testset
 from fsid.files import make_folder, write_atomically
 from fsid.sensor import develop, load_profile, read_raw
 
@@ -112,7 +112,7 @@ def _run(
     with bar("training on them", "steps") as progress:
         train(data, run, training, progress=progress)
     ours = model_method(run, "ours")
-    if not (testset / "testset.json").exists():
+    if not (testset / TESTSET_FILE).exists():
         photographs = _copy_photographs(out / "photographs", config.photographs)
         with bar("photographs to RAW", "photographs") as progress:
             photo_testset([photographs], testset, camera=CAMERA, isos=ISOS, progress=progress)

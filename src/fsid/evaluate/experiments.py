@@ -59,7 +59,7 @@ from fsid.evaluate.experiment_report import write_experiment_report
 from fsid.evaluate.known import known_note
 from fsid.evaluate.models import model_method
 from fsid.evaluate.simulated import LUXES, simulated_testset
-from fsid.evaluate.testset import levels_of, photo_testset, read_testset
+from fsid.evaluate.testset import TESTSET_FILE, levels_of, photo_testset, read_testset
 from fsid.files import make_folder, read_whole
 from fsid.scene import VARIANTS
 from fsid.sensor import load_bayer_profile
@@ -224,7 +224,7 @@ def _testsets(out: Path, config: ExperimentConfig, bar: ProgressBar) -> list[Pat
     """The simulated materials in lux, and every folder of photographs at TEST_ISOS."""
     root = out / "testsets"
     found = [root / MATERIALS_SET]
-    if not (found[0] / "testset.json").exists():
+    if not (found[0] / TESTSET_FILE).exists():
         with bar("drawing test materials", "pictures") as progress:
             simulated_testset(
                 found[0],
@@ -239,7 +239,7 @@ def _testsets(out: Path, config: ExperimentConfig, bar: ProgressBar) -> list[Pat
     for folder in config.tests:
         path = root / set_name(folder)
         found.append(path)
-        if not (path / "testset.json").exists():
+        if not (path / TESTSET_FILE).exists():
             with bar(f"test set {path.name}", "photographs") as progress:
                 photo_testset([Path(folder)], path, camera=config.camera, isos=TEST_ISOS, progress=progress)
         _check_camera(path, config.camera)

@@ -21,6 +21,7 @@ import numpy as np
 from fsid.errors import FsidError
 from fsid.sensor.bare import BARE_SUFFIXES, Layout, check_bayer, check_white, read_dn
 from fsid.sensor.black_levels import BlackLevels
+from fsid.sensor.camera_profile import MONO
 from fsid.sensor.defects import GAUSS_MAD
 from fsid.sensor.dng import RawHeader, read_header, read_stored
 from fsid.sensor.mosaic import TILE, check_cfa
@@ -215,7 +216,7 @@ def _raw_frames(paths: Sequence[Path], dark: Sequence[Path], layout: Layout) -> 
 
 
 def _bare_frames(paths: Sequence[Path], dark: Sequence[Path], layout: Layout) -> FrameSet:
-    cfa = None if layout.cfa in (None, "MONO") else check_cfa(str(layout.cfa), "--cfa")
+    cfa = None if layout.cfa in (None, MONO) else check_cfa(str(layout.cfa), "--cfa")
     levels = layout.black_level
     black = None if levels is None else BlackLevels.stated(levels, cfa, "--black-level")
     level = None if black is None else round(black.mean())

@@ -76,13 +76,13 @@ def image_tags(pixels: np.ndarray, photometric: int, subfile_type: int) -> tuple
     samples = 1 if pixels.ndim == 2 else pixels.shape[2]
     return (
         Tag(254, LONG, (subfile_type,)),
-        Tag(256, LONG, (pixels.shape[1],)),
+        Tag(WIDTH, LONG, (pixels.shape[1],)),
         Tag(257, LONG, (pixels.shape[0],)),
-        Tag(258, SHORT, (8 * pixels.itemsize,) * samples),
+        Tag(BITS, SHORT, (8 * pixels.itemsize,) * samples),
         Tag(COMPRESSION, SHORT, (1,)),  # none
         Tag(PHOTOMETRIC, SHORT, (photometric,)),
         Tag(277, SHORT, (samples,)),
-        Tag(278, LONG, (pixels.shape[0],)),
+        Tag(ROWS_PER_STRIP, LONG, (pixels.shape[0],)),
         Tag(284, SHORT, (1,)),  # samples of a pixel side by side
     )
 
