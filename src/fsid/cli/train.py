@@ -44,10 +44,11 @@ def train(
     from fsid.dataset.index import task_of
     from fsid.denoise import train as train_network
     from fsid.denoise import train_config
+    from fsid.denoise.run_folder import CONFIG_FILE
 
     if resume and (config != Path("nafnet-tiny") or set):
         raise FsidError("--resume: takes the settings of the run; leave out --config and --set")
-    settings = train_config(output / "config.yaml" if resume else config, set)
+    settings = train_config(output / CONFIG_FILE if resume else config, set)
     is_main = os.environ.get("RANK", "0") == "0"
     note_extrapolation(settings.profiles, settings.iso_min, settings.iso_max, quiet=quiet or not is_main)
     task = task_of(data)

@@ -23,7 +23,7 @@ from fsid import __version__
 from fsid.assets.file_names import PREFIX
 from fsid.assets.sources import split_source, survey_meshes
 from fsid.counted import counted
-from fsid.dataset.config import DatasetConfig
+from fsid.dataset.config import DATASET_FILE, DatasetConfig
 from fsid.dataset.index import index_mosaics
 from fsid.dataset.picture import grid, stored_preview
 from fsid.dataset.shards import read_records, records_of, shard_keys
@@ -78,7 +78,7 @@ class _Tally:
 
 def check_card(out: Path) -> None:
     """FsidError where the card of a dataset in `out` would replace files of something else."""
-    card, is_begun = out / CARD, (out / "config.yaml").exists()
+    card, is_begun = out / CARD, (out / DATASET_FILE).exists()
     if card.exists():
         check_file(card)
         with card.open("rb") as file:

@@ -15,6 +15,8 @@ from fsid.config import Override, check_fields, from_plain, load_named, load_set
 from fsid.errors import FsidError
 from fsid.scene import VARIANTS, SceneConfig
 
+DATASET_FILE = "config.yaml"
+"""In the folder of a dataset: its `DatasetConfig`."""
 TASKS = ("denoise", "super-resolution", "deblur", "burst")
 RENDERERS = ("raster", "reference")
 QUALITIES = ("high", "fast")

@@ -18,7 +18,7 @@ from pathlib import Path
 from fsid.assets.survey import KNOWN
 from fsid.config import check_fields, from_plain, read_yaml, save_settings, to_plain
 from fsid.dataset.card import CARD, check_card, write_card
-from fsid.dataset.config import RENDERED, DatasetConfig, GenerateConfig
+from fsid.dataset.config import DATASET_FILE, RENDERED, DatasetConfig, GenerateConfig
 from fsid.dataset.crew import Crew, LocalCrew, run
 from fsid.dataset.origins import (
     as_far_as_known,
@@ -142,7 +142,7 @@ def generate(
         if todo or not begun:
             check_card(out)
         if not begun:
-            save_settings(dataset, out / "config.yaml")
+            save_settings(dataset, out / DATASET_FILE)
         total = sum(len(shard.indices) for shard in todo)
         done = count - total
         progress(done, count)
@@ -259,7 +259,7 @@ def is_begun(out: str | Path, dataset: DatasetConfig) -> bool:
     Without samples there is no other, whatever a run that failed before its first shard left there.
     """
     out = Path(out)
-    file = out / "config.yaml"
+    file = out / DATASET_FILE
     if not file.exists():
         return False
     there = _used(from_plain(DatasetConfig, read_yaml(file), source=str(file)))

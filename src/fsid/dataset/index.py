@@ -22,7 +22,7 @@ import tifffile
 
 from fsid.config import from_plain, read_yaml
 from fsid.dataset.attempt import SAMPLE_KEY
-from fsid.dataset.config import DatasetConfig, split_of
+from fsid.dataset.config import DATASET_FILE, DatasetConfig, split_of
 from fsid.dataset.shards import find_shards, open_shard, read_heads
 from fsid.errors import FsidError
 from fsid.files import read_whole
@@ -72,7 +72,7 @@ def index_mosaics(data_dir: str | Path, kind: MosaicKind = "clean") -> tuple[Sto
     """
     data_dir = Path(data_dir)
     shards = tuple(find_shards(data_dir))
-    return _index(data_dir, kind, shards, tuple(map(_stamp, (*shards, data_dir / "config.yaml"))))
+    return _index(data_dir, kind, shards, tuple(map(_stamp, (*shards, data_dir / DATASET_FILE))))
 
 
 def _stamp(file: Path) -> tuple[int, ...]:
@@ -121,7 +121,7 @@ def identity(data_dir: Path) -> str:
     A digest of its config.yaml, or where there is none of its first clean image. FsidError as in
     `index_mosaics`.
     """
-    file = data_dir / "config.yaml"
+    file = data_dir / DATASET_FILE
     if file.exists():
         return hashlib.sha256(read_whole(file)).hexdigest()
     first = next(m for shard in find_shards(data_dir) for m in _index_shard(shard, ".clean.dng"))
@@ -130,14 +130,14 @@ def identity(data_dir: Path) -> str:
 
 def task_of(data_dir: Path) -> str:
     """What a dataset's pairs are for, as its config.yaml states; "denoise" where that states nothing."""
-    file = data_dir / "config.yaml"
+    file = data_dir / DATASET_FILE
     settings = read_yaml(file).get("generate") if file.exists() else None
     return str(settings.get("task", "denoise")) if isinstance(settings, dict) else "denoise"
 
 
 def _origin(data_dir: Path) -> Callable[[StoredMosaic], tuple[int, str]]:
     """Scene and split of a sample: by its key from config.yaml; where there is none, as its JSON says."""
-    file = data_dir / "config.yaml"
+    file = data_dir / DATASET_FILE
     if not file.exists():
         return _origin_by_json()
     plain = read_yaml(file)

@@ -8,7 +8,7 @@ from typing import Any
 
 from fsid.config import from_plain, read_yaml
 from fsid.dataset.attempt import SAMPLE_KEY, Sample, sample_key
-from fsid.dataset.config import DatasetConfig, GenerateConfig
+from fsid.dataset.config import DATASET_FILE, DatasetConfig, GenerateConfig
 from fsid.dataset.generate import dataset_config
 from fsid.dataset.origins import check_same_origins
 from fsid.dataset.sample import encode, make_sample, remake
@@ -51,7 +51,7 @@ def _from_key(
 ) -> Sample:
     if not SAMPLE_KEY.fullmatch(key):
         raise FsidError(f"--only {key}: is neither the key of a sample, like 00000012, nor a .json file")
-    index, file = int(key), out / "config.yaml"
+    index, file = int(key), out / DATASET_FILE
     if file.exists():
         dataset = from_plain(DatasetConfig, read_yaml(file), source=str(file))
         if config not in (None, dataset.generate) or seed not in (None, dataset.seed):

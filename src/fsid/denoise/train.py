@@ -29,6 +29,7 @@ from torch import Tensor
 
 from fsid.config import read_json, read_yaml, to_plain
 from fsid.counted import counted
+from fsid.dataset.config import DATASET_FILE
 from fsid.dataset.feed import batches
 from fsid.dataset.index import StoredMosaic, identity, index_mosaics
 from fsid.dataset.loader import Batch, PatchConfig, PatchDataset
@@ -258,7 +259,7 @@ def _card(data_dir: Path, config: TrainConfig, images: int, initial: Denoiser | 
 
 def _settings_of(data_dir: Path) -> dict[str, object]:
     """What the config.yaml of a dataset says; FsidError for what no card can say: dates, bytes, sets."""
-    file = data_dir / CONFIG_FILE
+    file = data_dir / DATASET_FILE
     plain = read_yaml(file) if file.is_file() else {}
     try:
         json.dumps(plain)
