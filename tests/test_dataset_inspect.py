@@ -337,6 +337,20 @@ def test_a_sample_without_its_colours_is_named(record, tmp_path):
     assert "\n" not in str(caught.value)
 
 
+def test_of_a_large_dataset_only_the_shards_of_the_measured_pictures_are_opened(tmp_path):
+    record = b'{"white_balance": [2, 1, 2], "xyz_to_camera": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}'
+    for number in range(9):
+        image = io.BytesIO()
+        mosaic = np.full((32, 32), 0.1 * number, np.float32)
+        write_dng(image, Raw(mosaic, "RGGB", 0, 65535, (2.0, 1.0, 1.5), np.eye(3)))
+        files = {"clean.dng": image.getvalue(), "json": record}
+        write_shard(shard_path(tmp_path, number), [(f"{number:08d}", files)])
+    lightness = inspect(tmp_path).values["exposure"]
+    for number in set(range(9)) - {0, 4, 8}:
+        shard_path(tmp_path, number).write_bytes(b"no shard")
+    np.testing.assert_array_equal(inspect(tmp_path, limit=3).values["exposure"], lightness[[0, 4, 8]])
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

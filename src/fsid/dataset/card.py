@@ -24,7 +24,7 @@ from fsid.assets.file_names import PREFIX
 from fsid.assets.sources import split_source, survey_meshes
 from fsid.counted import counted
 from fsid.dataset.config import DATASET_FILE, DatasetConfig
-from fsid.dataset.index import index_mosaics
+from fsid.dataset.index import some_mosaics
 from fsid.dataset.picture import grid, stored_preview
 from fsid.dataset.shards import read_records, records_of, shard_keys
 from fsid.errors import FsidError
@@ -175,7 +175,7 @@ def _statistics(out: Path) -> Iterable[str]:
     from fsid.dataset.inspect import inspect  # with libraries that a worker never needs
     from fsid.dataset.statistics import TITLES
 
-    if min(min(mosaic.height, mosaic.width) for mosaic in index_mosaics(out)) < _SMALLEST_PX:
+    if min(min(mosaic.height, mosaic.width) for mosaic in some_mosaics(out, _MEASURED)) < _SMALLEST_PX:
         return
     found = inspect(out, limit=_MEASURED)
     yield from ("", "## Statistics", "", f"Means over {found.pictures} of the clean images (`fsid inspect`).")

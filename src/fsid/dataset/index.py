@@ -11,11 +11,11 @@ from __future__ import annotations
 import hashlib
 import operator
 import tarfile
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 import tifffile
@@ -31,6 +31,8 @@ from fsid.sensor.mosaic import check_cfa
 from fsid.sensor.quantise import check_levels
 from fsid.sensor.raw import NoiseLevel
 from fsid.sensor.tiff import quotients
+
+T = TypeVar("T")
 
 _ORIGIN_KEYS = ("crops", "exposures", "noise_levels", "validation_every")
 """Settings that say which scene a sample is from; others may be those of another version of FSID."""
@@ -75,6 +77,30 @@ def index_mosaics(data_dir: str | Path, kind: MosaicKind = "clean") -> tuple[Sto
     return _index(data_dir, kind, shards, tuple(map(_stamp, (*shards, data_dir / DATASET_FILE))))
 
 
+def some_mosaics(data_dir: Path, limit: int) -> list[StoredMosaic]:
+    """Clean mosaics of `data_dir`, evenly spaced, at most `limit` of as many shards; no other is opened.
+
+    Scene and split are not looked up. FsidError where these shards hold none, or as `index_mosaics`.
+    """
+    shards = spaced(find_shards(data_dir), limit)
+    found = [mosaic for shard in shards for mosaic in _index_shard(shard, ".clean.dng")]
+    if not found:
+        raise _nothing_in(data_dir, "clean")
+    return spaced(found, limit)
+
+
+def spaced(items: Sequence[T], limit: int) -> list[T]:
+    """`items`, of more than `limit` so many, evenly spaced."""
+    at = np.linspace(0, len(items) - 1, min(limit, len(items))).round().astype(int)
+    return [items[i] for i in at]
+
+
+def _nothing_in(data_dir: Path, kind: MosaicKind) -> FsidError:
+    return FsidError(
+        f"{data_dir}: its shards hold no *.{kind}.dng; make the dataset again with `fsid generate`"
+    )
+
+
 def _stamp(file: Path) -> tuple[int, ...]:
     """What changes with the content of a file; () where there is none."""
     try:
@@ -102,9 +128,7 @@ def _index(
             scene, split = origin(mosaic)
             found[mosaic.key] = replace(mosaic, scene=scene, split=split)
     if not found:
-        raise FsidError(
-            f"{data_dir}: its shards hold no *.{kind}.dng; make the dataset again with `fsid generate`"
-        )
+        raise _nothing_in(data_dir, kind)
     return _split_by_scene(found.values())
 
 

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fsid.dataset.index import StoredMosaic, index_mosaics
+from fsid.dataset.index import StoredMosaic, some_mosaics, spaced
 from fsid.dataset.photos import find_photos, read_photo
 from fsid.dataset.shards import read_member, read_record
 from fsid.dataset.statistics import Comparison, compare, measure, pool
@@ -150,13 +150,8 @@ def _reader(folder: Path, limit: int) -> Reader:
     if not folder.is_dir():
         raise FsidError(f"{folder}: is neither a dataset nor a folder of photographs")
     if any(folder.glob("shard-*.tar")):
-        return _spaced(index_mosaics(folder), limit), _stored_picture
-    return _spaced(find_photos(folder), limit), _photo_picture
-
-
-def _spaced(items: Sequence, limit: int) -> list:
-    at = np.linspace(0, len(items) - 1, min(limit, len(items))).round().astype(int)
-    return [items[i] for i in at]
+        return some_mosaics(folder, limit), _stored_picture
+    return spaced(find_photos(folder), limit), _photo_picture
 
 
 def _stored_picture(stored: StoredMosaic) -> np.ndarray:
