@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -26,8 +27,10 @@ from fsid.cli.main import main
 from fsid.config import load_settings, read_yaml
 from fsid.dataset import (
     GenerateConfig,
+    attempt,
     dataset_config,
     encode,
+    find_pictures,
     generate,
     make_frame,
     make_only,
@@ -38,6 +41,7 @@ from fsid.dataset import (
     shard_path,
     write_shard,
 )
+from fsid.dataset.attempt import Attempt
 from fsid.dataset.generate import _Shard
 from fsid.dataset.sample import Sample
 from fsid.dataset.settle import settle
@@ -423,6 +427,19 @@ def test_more_pairs_of_a_frame_than_memory_holds_are_named():
 def album(photos: Path, tmp_path: Path) -> Path:
     """A folder of three photographs that a test may change."""
     return Path(shutil.copytree(photos, tmp_path / "album"))
+
+
+def test_a_folder_of_pictures_is_listed_again_where_it_changed(album: Path, monkeypatch: pytest.MonkeyPatch):
+    listings = []
+    monkeypatch.setattr(attempt, "find_pictures", lambda folder: listings.append(0) or find_pictures(folder))
+    config = small(f"images={album}")
+    drawn = [Attempt(config, 0, frame).drawn_picture()[1].name for frame in range(4)]
+    assert drawn == ["coffee-0.png", "coffee-1.png", "coffee-2.png", "coffee-0.png"]
+    assert len(listings) == 1
+    (album / "coffee-0.png").unlink()
+    os.utime(album, ns=(1, 1))  # a clock may be too coarse to tell
+    assert Attempt(config, 0, 0).drawn_picture()[1].name == "coffee-1.png"
+    assert len(listings) == 2
 
 
 def test_pictures_that_changed_are_not_mixed_into_a_dataset(album: Path, tmp_path: Path):

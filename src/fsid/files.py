@@ -50,6 +50,15 @@ def check_file(path: Path) -> None:
         raise FsidError(f"{path}: cannot be read (it is no file)")
 
 
+def stamp(path: Path) -> tuple[int, ...]:
+    """What changes with the content of a file, or with the names in a folder; () where there is none."""
+    try:
+        found = path.stat()
+    except FileNotFoundError:
+        return ()
+    return found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns
+
+
 def write_atomically(path: Path, data: bytes) -> None:
     """Replace `path` by `data`, or leave it as it was. FsidError where the disk refuses."""
     write_together({path: data})

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,7 @@ from fsid.dataset.tasks import (
     views_of_scene,
 )
 from fsid.errors import FsidError
+from fsid.files import stamp
 from fsid.scene import Scene
 from fsid.scene import sample as sample_scene
 from fsid.sensor import (
@@ -126,7 +128,7 @@ class Attempt:
 
     def drawn_picture(self) -> tuple[int, Path]:
         """The picture that this attempt takes, and its number in `config.images`."""
-        paths = find_pictures(Path(self.config.images))
+        paths = _listed(self.config.images, stamp(Path(self.config.images)))
         number = self.frame % len(paths)
         return number, paths[number]
 
@@ -237,6 +239,12 @@ class Attempt:
 
     def _rng(self, *place: int) -> np.random.Generator:
         return np.random.default_rng(self._stream(*place))
+
+
+@lru_cache(maxsize=1)
+def _listed(folder: str, stamped: tuple[int, ...]) -> tuple[Path, ...]:
+    """`find_pictures` while the folder is as `stamped` says: of 10,000 it takes longer than a small frame."""
+    return tuple(find_pictures(folder))
 
 
 def _half_precision(flow: np.ndarray) -> np.ndarray:

@@ -25,7 +25,7 @@ from fsid.dataset.attempt import SAMPLE_KEY
 from fsid.dataset.config import DATASET_FILE, DatasetConfig, split_of
 from fsid.dataset.shards import find_shards, open_shard, read_heads
 from fsid.errors import FsidError
-from fsid.files import read_whole
+from fsid.files import read_whole, stamp
 from fsid.sensor import dng_tags
 from fsid.sensor.mosaic import check_cfa
 from fsid.sensor.quantise import check_levels
@@ -74,7 +74,7 @@ def index_mosaics(data_dir: str | Path, kind: MosaicKind = "clean") -> tuple[Sto
     """
     data_dir = Path(data_dir)
     shards = tuple(find_shards(data_dir))
-    return _index(data_dir, kind, shards, tuple(map(_stamp, (*shards, data_dir / DATASET_FILE))))
+    return _index(data_dir, kind, shards, tuple(map(stamp, (*shards, data_dir / DATASET_FILE))))
 
 
 def some_mosaics(data_dir: Path, limit: int) -> list[StoredMosaic]:
@@ -99,15 +99,6 @@ def _nothing_in(data_dir: Path, kind: MosaicKind) -> FsidError:
     return FsidError(
         f"{data_dir}: its shards hold no *.{kind}.dng; make the dataset again with `fsid generate`"
     )
-
-
-def _stamp(file: Path) -> tuple[int, ...]:
-    """What changes with the content of a file; () where there is none."""
-    try:
-        found = file.stat()
-    except FileNotFoundError:
-        return ()
-    return found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns
 
 
 @lru_cache(maxsize=2)  # clean and noisy mosaics
