@@ -442,6 +442,19 @@ def test_a_folder_of_pictures_is_listed_again_where_it_changed(album: Path, monk
     assert len(listings) == 2
 
 
+def test_pictures_that_change_while_a_dataset_is_made_end_it(album: Path, tmp_path: Path):
+    """The frames after would take others, and be of other scenes and splits than their numbers say."""
+    dataset = dataset_config(small(f"images={album}"), 0, shard_size=1)
+    shards = [_Shard(shard_path(tmp_path, i), 0, range(i, i + 1), dataset) for i in range(2)]
+    worker = Worker(None, {})
+    assert shards[0].do(worker) == 1
+    shutil.copy(album / "coffee-0.png", album / "coffee-3.png")
+    os.utime(album, ns=(1, 1))
+    with pytest.raises(FsidError, match=r"album: holds other pictures .* 3 then, 4 now"):
+        shards[1].do(worker)
+    assert not shards[1].path.exists()
+
+
 def test_pictures_that_changed_are_not_mixed_into_a_dataset(album: Path, tmp_path: Path):
     out, config = tmp_path / "out", small(f"images={album}")
     generate(out, config, count=2)

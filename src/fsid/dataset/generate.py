@@ -23,6 +23,7 @@ from fsid.dataset.crew import Crew, LocalCrew, run
 from fsid.dataset.origins import (
     as_far_as_known,
     check_same_origins,
+    check_same_pictures,
     files_digest,
     in_places_of,
     source_folders,
@@ -34,7 +35,7 @@ from fsid.dataset.shards import count_whole, each_sample, remove_parts, shard_pa
 from fsid.dataset.tasks import SceneRenderer, check_cameras, check_task
 from fsid.dataset.worker import Worker
 from fsid.errors import FsidError, check_kind, whole
-from fsid.files import held
+from fsid.files import held, stamp
 from fsid.sensor import CameraProfile, load_bayer_profile
 from fsid.sensor.profiles import profiles_digest
 
@@ -86,7 +87,9 @@ class _Shard:
         return self.path.name
 
     def do(self, worker: Worker) -> int:
-        """Write the shard; number of its new samples."""
+        """Write the shard; number of its new samples. FsidError where pictures came or went meanwhile."""
+        if images := self.dataset.generate.images:
+            check_same_pictures(self.path.parent, self.dataset, stamp(Path(images)))
         kept = itertools.islice(each_sample(self.path), self.kept) if self.kept else ()
         write_shard(self.path, itertools.chain(kept, self._samples(worker)))
         return len(self.indices)

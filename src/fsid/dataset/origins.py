@@ -12,6 +12,7 @@ import hashlib
 import os
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -85,6 +86,13 @@ def check_same_origins(out: Path, dataset: DatasetConfig) -> None:
             f"{out}: was begun with other files than {', '.join(source_folders(dataset.generate.scene))} can "
             "give now (names or sizes differ); put those back, or use another folder"
         )
+
+
+@lru_cache(maxsize=1)  # each shard asks, and the sizes of 10,000 files take longer than a small frame
+def check_same_pictures(out: Path, dataset: DatasetConfig, stamped: tuple[int, ...]) -> None:
+    """FsidError unless the pictures of `dataset` are those that it was begun with. stamped: their folder's
+    `stamp`; while it stays, they count as the same."""
+    _check_pictures(out, dataset)
 
 
 def _check_pictures(out: Path, dataset: DatasetConfig) -> None:
