@@ -90,6 +90,19 @@ def test_rows_are_means_over_the_files(small_set: Path, tmp_path: Path):
     assert [row["camera"] for row in written] == ["pixel6"] * 4
 
 
+def test_a_report_shows_some_of_many_images(
+    small_set: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first, _, last = read_testset(small_set).images
+    for most, told in ((3, ""), (2, "Of 2 of the 3 images. ")):
+        monkeypatch.setitem(compare.__globals__, "MOST_CROPS", most)
+        comparison = compare(small_set, [NOISY], crop_levels=["iso3200"], crop_px=16)
+        write_comparison(comparison, small_set, tmp_path)
+        assert f"{told}Drag the border" in (tmp_path / "report.html").read_text()
+    assert [crops.image for crops in comparison.crops] == [first.name, last.name]
+    assert len(comparison.images) == 6
+
+
 def test_the_truth_scores_perfectly(small_set: Path):
     testset = read_testset(small_set)
     truths = iter(testset.images)

@@ -17,6 +17,7 @@ from scipy.ndimage import gaussian_filter
 from scipy.special import stdtrit
 
 from fsid.counted import counted
+from fsid.dataset.index import spaced
 from fsid.errors import FsidError
 from fsid.evaluate.classical import denoise_classical
 from fsid.evaluate.metrics import psnr, ssim
@@ -27,6 +28,10 @@ from fsid.sensor import Raw, develop, read_raw, upright
 MOST_DB = 100.0
 """What a PSNR counts as at most: an rms error of 1e-5 of white is less than a step of a 16-bit file. A result
 that equals its truth has an infinite one, and so would have every mean over it."""
+
+MOST_CROPS = 100
+"""Images of which windows are kept: under three methods each takes half a megabyte of a report, and 1,000
+would make a page that opens nowhere."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +112,8 @@ def compare(
 ) -> Comparison:
     """Run every method on every capture of the test set in `root`.
 
-    crop_levels: levels of which a window of every image is kept; crop_px: its edge in pixels.
+    crop_levels: levels of which a window of every image is kept, of many those of `MOST_CROPS` evenly spaced;
+    crop_px: its edge in pixels.
     Rows cover each set, and all sets together where there is more than one. FsidError: an unusable test set,
     of which every file is read before anything is measured, or a method whose result is not as `Method` says.
     """
@@ -123,7 +129,7 @@ def compare(
     if unknown := set(crop_levels) - set(testset.levels):
         raise FsidError(f"{root}: has no level {', '.join(sorted(unknown))}")
     images: list[ImageRow] = []
-    crops = []
+    crops, shown = [], spaced(testset.images, MOST_CROPS)
     tasks = list(product(testset.images, testset.levels))
     progress(0, len(tasks))
     for image, level in tasks:
@@ -144,7 +150,7 @@ def compare(
             shown_psnr[method.name] = figures[0][0]
             mean = map(float, np.mean(figures, axis=0))
             images.append(ImageRow(method.name, level, image.set, image.name, *mean))
-        if level in crop_levels:
+        if level in crop_levels and image in shown:
             turn = truth.metadata.orientation
             crops.append(_crops(image, level, developed_truth, outputs, shown_psnr, crop_px, turn))
     progress(len(tasks), len(tasks))

@@ -47,9 +47,11 @@ def comparison_sections(comparison: Comparison) -> list[Section]:
         sections.append(Section("Set by set", text, tuple(_set_table(comparison.rows, s) for s in single)))
     if not comparison.crops:
         return sections
+    shown, count = len({crops.image for crops in comparison.crops}), len(comparison.testset.images)
+    some = f"Of {shown} of the {count} images. " if shown < count else ""
     before_after = Section(
         "Before and after",
-        "Drag the border. Left of it the noisy input, right of it the last method of the tables.",
+        f"{some}Drag the border. Left of it the noisy input, right of it the last method of the tables.",
         sliders=tuple(_chunks([_slider(crops) for crops in comparison.crops], 3)),
     )
     side_by_side = Section(
