@@ -194,7 +194,8 @@ def test_licences_of_meshes_are_counted_by_use(tmp_path: Path) -> None:
         folder.mkdir()
         trimesh.creation.box((0.3, 0.2, 0.1)).export(folder / "box.glb")
     (folders[0] / "LICENSE.txt").write_text("CC0 1.0 Universal\n")
-    used = Counter({f"file:{folder / 'box.glb'}": n for folder, n in zip(folders, (3, 2), strict=True)})
+    most = 10**15  # so many cannot be counted one by one
+    used = Counter({f"file:{folder / 'box.glb'}": n for folder, n in zip(folders, (most, 2), strict=True)})
     stated, unknown = _sources(_Tally({"mesh": used}))
-    assert "3 uses. Licences: CC0 (3) uses." in stated
+    assert f"{most} uses. Licences: CC0 ({most}) uses." in stated
     assert f"`{folders[1]}`: 2 uses. No licence file was found" in unknown

@@ -161,7 +161,7 @@ def _sources(tally: _Tally) -> Iterable[str]:
         own = Counter({key: n for key, n in used.items() if not key.startswith(PREFIX)})
         if own:
             yield f"- FSID's own {name} (Apache-2.0, made by formula): {_listed(own, 'uses')}."
-        for folder, n in sorted(Counter(_folder(key) for key in (used - own).elements()).items()):
+        for folder, n in sorted(_summed(used - own, _folder).items()):
             place = " ".join(folder.replace("`", "'").split())
             yield f"- {name} from `{place}`: {counted(n, 'use')}. {_licence(what, Path(folder), used)}"
     pictures = tally.counts.get("picture", Counter())
@@ -183,6 +183,14 @@ def _statistics(out: Path) -> Iterable[str]:
     yield from (f"| {TITLES[name]} | {values.mean():.3g} |" for name, values in found.values.items())
 
 
+def _summed(counts: Counter[str], group: Callable[[str], str]) -> Counter[str]:
+    """The counts of each group; of a large dataset they are millions."""
+    summed: Counter[str] = Counter()
+    for name, count in counts.items():
+        summed[group(name)] += count
+    return summed
+
+
 def _folder(source: str) -> str:
     """The folder or library of a "file:PATH" or "file:PATH!MEMBER"."""
     path, member = split_source(source)
@@ -194,7 +202,7 @@ def _licence(what: str, place: Path, used: Counter[str]) -> str:
     if what == "mesh" and place.exists():
         licences = {source.name: source.licence for source in survey_meshes(str(place)).usable}
         stated = Counter({name: n for name, n in used.items() if licences.get(name)})
-        by_licence = Counter(licences[name] for name in stated.elements())
+        by_licence = _summed(stated, lambda name: licences[name])
         if by_licence:
             return f"Licences: {_listed(by_licence, 'uses')}."
     return _folder_licence(place)
