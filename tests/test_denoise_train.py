@@ -404,7 +404,9 @@ def test_held_out_pictures_are_at_most_a_fifth_of_the_data(
     write_shard(shard_path(tmp_path, 0), [(f"{number:08d}", sample) for number in range(images)])
     save_settings(DatasetConfig(0, images, GenerateConfig(), pictures=pictures), tmp_path / "config.yaml")
     found = held_out(tmp_path, replace(CONFIG, held_out=wanted))
-    assert [mosaic.key for mosaic in found] == [f"{number:08d}" for number in range(images - kept, images)]
+    keys = [f"{number:08d}" for number in range(images - kept, images)]
+    assert [mosaic.key for mosaic in found] == keys
+    assert held_out(tmp_path, CONFIG, iter(keys)) == found
 
 
 def test_a_training_that_validates_nothing_says_so(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

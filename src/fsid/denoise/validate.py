@@ -10,7 +10,7 @@ so that a network "trained on scenes alone" is not chosen by photographs either.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -69,7 +69,7 @@ class Validation:
 
 
 def held_out(
-    data_dir: Path, config: TrainConfig, keys: Collection[str] | None = None
+    data_dir: Path, config: TrainConfig, keys: Iterable[str] | None = None
 ) -> tuple[StoredMosaic, ...]:
     """The images of `data_dir` with these keys; None: its last `config.held_out`.
 
@@ -78,7 +78,8 @@ def held_out(
     """
     mosaics = index_mosaics(data_dir)
     if keys is not None:
-        return tuple(mosaic for mosaic in mosaics if mosaic.key in keys)
+        kept_keys = frozenset(keys)
+        return tuple(mosaic for mosaic in mosaics if mosaic.key in kept_keys)
     of_scene = Counter(mosaic.scene for mosaic in mosaics)
     left, kept = len(mosaics) // 5, []
     for mosaic in mosaics[::-1][: config.held_out]:
