@@ -803,6 +803,14 @@ def test_a_denoiser_from_pairs_for_something_else_is_said_to_be_one(
     assert not capsys.readouterr().err
 
 
+def test_a_history_is_no_longer_than_a_checkpoint_can_hold() -> None:
+    """safetensors takes 100 MB of header, and the training ended there in a traceback, after days."""
+    replace(CONFIG, steps=2_000_000, log_every=5, validate_every=1000)
+    for every in ({"log_every": 1}, {"validate_every": 1}):
+        with pytest.raises(FsidError, match=r"log_every \d, validate_every \d+: 2,\d{3},000 rows"):
+            replace(CONFIG, **{"steps": 2_000_000, "log_every": 5, "validate_every": 1000, **every})
+
+
 def test_bad_input_is_named(data: Path, tmp_path: Path) -> None:
     with pytest.raises(FsidError, match="no training to resume"):
         train(data, tmp_path / "run", CONFIG, resume=True)

@@ -15,6 +15,8 @@ from fsid.errors import FsidError
 
 _MAX_BATCH_PX = 2**28  # packed pixels, 4 GiB of patches
 _MAX_THREADS = 1024  # a system that runs out of them fails anywhere, with messages that make no sense
+_MOST_ROWS = 500_000
+"""Of loss and validation, which are in the header of a checkpoint; safetensors takes 100 MB of it."""
 
 
 @dataclass(frozen=True)
@@ -78,6 +80,12 @@ class TrainConfig:
         ):
             if getattr(self, key) > most:
                 raise FsidError(f"{key}: must be at most {most}, got {getattr(self, key)}")
+        rows = self.steps // self.log_every + self.steps // self.validate_every
+        if rows > _MOST_ROWS:
+            raise FsidError(
+                f"log_every {self.log_every}, validate_every {self.validate_every}: {rows:,} rows of history "
+                f"are more than the {_MOST_ROWS:,} that a checkpoint has room for; raise them"
+            )
         check_shrink(self.shrink)
         for key in ("learning_rate", "final_rate", "weight_decay"):
             if not 0 <= getattr(self, key) < math.inf:
