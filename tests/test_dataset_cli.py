@@ -159,8 +159,8 @@ def test_texture_sets_are_read_behind_a_bar_before_the_first_pair(
     Image.new("RGB", (16, 16), (90, 120, 60)).save(tmp_path / "wall_Color.png")
     Image.new("RGB", (16, 16)).save(tmp_path / "wall_Normal.png")
     command = ["--count", "1", "--width", "32", "--height", "32", "--dry-run"]
-    setting = f"scene.texture_folders=[{tmp_path}]"
-    main(["generate", str(tmp_path / "out"), *command, "--set", setting])
+    settings = f"scene.texture_folders=[{tmp_path}]", "scene.objects=[1,1]"
+    main(["generate", str(tmp_path / "out"), *command, "--set", *settings])
     said = " ".join(capsys.readouterr().err.split())
     assert "reading" in said
     assert f"{tmp_path}: 1 texture set, 1 skipped, first {tmp_path}/wall_Normal.png: wall_Normal" in said
