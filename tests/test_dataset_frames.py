@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from fsid.config import load_settings
 from fsid.dataset import GenerateConfig, encode, make_frame, make_sample, remake, shard_path, write_shard
 from fsid.dataset.checks import distance, fingerprint, flaw
 from fsid.dataset.config import Checks, split_of
-from fsid.dataset.settle import REDRAWS, Looks, settle
+from fsid.dataset.settle import REDRAWS, Looks, Settle, settle
 from fsid.dataset.shards import read_records, read_samples
 from fsid.errors import FsidError
 from fsid.scene import Scene
@@ -230,6 +231,28 @@ def settled(
         settle(shards[:1], settings, 1, lambda task: task.do(PaintingWorker()))
     settle(shards, settings, 1, lambda task: task.do(PaintingWorker()))
     return shards
+
+
+def test_of_many_shards_a_worker_settles_some_at_a_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A bar stood still from the first near-duplicate of 175,000 pairs on. All of these look alike."""
+    monkeypatch.setitem(settle.__globals__, "_TOGETHER", 2)
+    settings = config("checks.duplicate_bits=256")
+    shards = [shard_path(tmp_path, number) for number in range(6)]
+    for number, path in enumerate(shards):
+        sample = make_sample(settings, 1, number, Painter())
+        write_shard(path, [(sample.key, encode(sample))])
+    done: list[list[Path] | int] = []
+
+    def do(task: Settle) -> Looks:
+        done.append(list(task.paths))
+        return pickle.loads(pickle.dumps(task)).do(PaintingWorker())
+
+    settle(shards, settings, 1, do, done.append)
+    assert done == [1, shards[1:3], 3, shards[3:5], 5, shards[5:], 6]
+    refused = [len(record["refused"]) for path in shards for record in read_records(path)]
+    assert refused == [0, *5 * [REDRAWS]]
 
 
 def test_near_duplicates_are_drawn_again_by_order_alone(tmp_path: Path) -> None:

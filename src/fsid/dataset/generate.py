@@ -30,7 +30,7 @@ from fsid.dataset.origins import (
 )
 from fsid.dataset.pictures import find_pictures, pictures_digest
 from fsid.dataset.sample import encode, make_frame
-from fsid.dataset.settle import Settle, settle
+from fsid.dataset.settle import Looks, Settle, settle
 from fsid.dataset.shards import count_whole, each_sample, remove_parts, shard_path, write_shard
 from fsid.dataset.tasks import SceneRenderer, check_cameras, check_task
 from fsid.dataset.worker import Worker
@@ -156,8 +156,9 @@ def generate(
                 done += made
                 progress(done, count)
 
-        def redraw(task: Settle) -> None:
-            list(run(workforce.crew(1), [task], tasks_per_worker=1, lost=lost))
+        def redraw(task: Settle) -> Looks:
+            ((_, looks),) = run(workforce.crew(1), [task], tasks_per_worker=1, lost=lost)
+            return looks
 
         if todo or not (out / CARD).exists():
             shards = list(_unbroken(out, dataset.shard_size))

@@ -22,6 +22,9 @@ from fsid.dataset.shards import read_heads, read_samples, records_of, write_shar
 from fsid.dataset.worker import Worker
 
 REDRAWS = ATTEMPTS // 2
+_TOGETHER = 256
+"""Shards that a worker settles before the next are looked at: it takes seconds to start, and nothing is told
+of what is done while it works."""
 
 
 class Looks:
@@ -80,10 +83,12 @@ class Settle:
     def __str__(self) -> str:
         return f"the near-duplicates from {self.paths[0].name} on"
 
-    def do(self, worker: Worker) -> None:
+    def do(self, worker: Worker) -> Looks:
+        """Those of all frames up to the last of these shards."""
         for path in self.paths:
             if _has_open(path, self.looks):
                 self._redraw(path, worker)
+        return self.looks
 
     def _redraw(self, path: Path, worker: Worker) -> None:
         samples = read_samples(path)
@@ -106,19 +111,21 @@ def settle(
     shards: Sequence[Path],
     config: GenerateConfig,
     seed: int,
-    do: Callable[[Settle], None],
+    do: Callable[[Settle], Looks],
     read: Callable[[int], None] = lambda shards: None,
 ) -> None:
-    """Settle the frames of all shards; `do` has a worker do a task, which settles the rest of them where one
-    has to be drawn again. read(shards): called for every shard before. Not for pictures, see `Checks`."""
-    looks = Looks(config.checks.duplicate_bits)
+    """Settle the frames of all shards; `do` has a worker do a task, which settles a shard that has one to be
+    drawn again and some after it. read(shards): so many are done. Not for pictures, see `Checks`."""
+    looks, done = Looks(config.checks.duplicate_bits), 0
     if config.images or config.checks.duplicate_bits < 0:
         return
-    for number, shard in enumerate(shards):
-        if _has_open(shard, looks):
-            do(Settle(tuple(shards[number:]), config, seed, looks))
-            return
-        read(number + 1)
+    while done < len(shards):
+        some = shards[done : done + 1]
+        if _has_open(some[0], looks):
+            some = shards[done : done + _TOGETHER]
+            looks = do(Settle(tuple(some), config, seed, looks))
+        done += len(some)
+        read(done)
 
 
 def _has_open(shard: Path, looks: Looks) -> bool:
