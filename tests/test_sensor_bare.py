@@ -9,7 +9,7 @@ from PIL import Image
 
 from fsid.errors import FsidError
 from fsid.sensor import CFA_PATTERNS, develop, pack, raw_from_dn, read_mosaic, unpack
-from fsid.sensor.bare import check_bayer, read_dn
+from fsid.sensor.bare import check_bayer, check_white, read_dn
 
 DN = np.random.default_rng(0).integers(0, 4096, (6, 8)).astype(np.uint16)
 CAMERA = {"cfa": "GRBG", "black_level": 256, "white_level": 4095}
@@ -163,7 +163,9 @@ def test_noise_of_rows_and_columns_is_no_other_filter(light):
     other = (("RRGG", "RRGG", "GGBB", "GGBB"), ("GBGGRG", "RGRBGB", "GBGGRG", "GRGGBG", "BGBRGR", "GRGGBG"))
     for seed in range(30):
         rng = np.random.default_rng(seed)
-        lines = rng.normal(64, 11, (96, 1)) + rng.normal(0, 11, (1, 128)) + rng.normal(0, 13, (96, 128))
+        rows, columns = ((11, 11), (15, 0), (0, 15))[seed % 3]
+        lines = rng.normal(64, rows, (96, 1)) + rng.normal(0, columns, (1, 128))
+        lines = lines + rng.normal(0, 13, (96, 128))
         for filters in (("GR", "BG"), *(other if light else ())):
             tile = np.array([[{"R": 0.5, "G": 1.0, "B": 0.6}[colour] for colour in row] for row in filters])
             through = np.tile(tile, -(-np.array((96, 128)) // tile.shape))[:96, :128]
@@ -192,6 +194,19 @@ def test_a_white_level_between_two_integers_is_refused():
     """Black levels are means, which have fractions; white is a DN, and 4094.9 was taken for 4094."""
     with pytest.raises(FsidError, match=r"white level 4094\.9 is no whole DN"):
         raw_from_dn(DN, cfa="RGGB", black_level=64.5, white_level=4094.9)
+
+
+def test_hot_pixels_and_values_a_little_above_white_are_no_other_white_level():
+    """A tenth of the range above black, and one pixel in a thousand."""
+    black, white = 4000, 5000
+    dn = np.full((100, 100), 4500, np.uint16)
+    for value, pixels, is_wrong in ((5090, 100 * 100, False), (5110, 9, False), (5110, 11, True)):
+        dn.ravel()[:pixels] = value
+        if is_wrong:
+            with pytest.raises(FsidError, match="far beyond the white level 5000"):
+                check_white(dn, black, white, "a.npy")
+        else:
+            check_white(dn, black, white, "a.npy")
 
 
 def test_a_size_below_0_is_none(tmp_path):

@@ -1,5 +1,6 @@
 """Frames on disk become the profile of the camera that took them."""
 
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -22,7 +23,7 @@ from fsid.sensor import (
 )
 from fsid.sensor.calibrate import NoiseFit
 from fsid.sensor.fitted_profile import profile_of, site_blacks
-from fsid.sensor.frames import find_frames
+from fsid.sensor.frames import Frame, bursts, find_frames
 from fsid.sensor.mosaic import site_offsets
 from stated_black import state_black
 
@@ -95,6 +96,9 @@ def test_bursts_at_several_isos_give_a_profile_for_any_iso(dng_bursts, tmp_path)
         truth = PROFILE.level(iso)
         within(profile.k[row], truth.k, measured.k_error[row])
         within(profile.sigma2[row], truth.sigma2, measured.sigma2_error[row])
+        fit = found.fits[row]
+        np.testing.assert_allclose(measured.k_error[row] * 959, fit.k_dn_error, rtol=1e-4)
+        np.testing.assert_allclose(measured.sigma2_error[row] * 959**2, fit.sigma2_dn_error, rtol=1e-4)
     for iso in (800, 3200, 12800):
         np.testing.assert_allclose(profile.level(iso).k, PROFILE.level(iso).k, rtol=0.12)
     assert "k_departure" in (tmp_path / "mine.yaml").read_text()
@@ -283,12 +287,26 @@ def test_bare_dark_frames_that_drift_are_one_burst(tmp_path, rng):
     np.testing.assert_allclose(fit.sigma2_dn / 959**2, PROFILE.level(3200).sigma2, rtol=0.05)
 
 
+def test_frames_of_a_burst_are_like_its_first_one(tmp_path, rng):
+    """Within 3 % of its light, however slowly that changes; dark ones within three times their noise, by
+    pixels of one site."""
+    levels = (100.0, 102.0, 104.0, 106.0, 109.5)
+    frames = [Frame(Path(f"{level}"), 100.0, 0.0, level, 0.03 * level) for level in levels]
+    assert [[frame.level for frame in burst] for burst in bursts(frames)] == [[100, 102], [104, 106], [109.5]]
+    sites = np.kron(np.ones((64, 64), np.int64), np.array([[200, 240], [260, 220]]))
+    images = [np.rint(sites + 12 * rng.standard_normal(sites.shape)).astype(np.uint16) for _ in range(2)]
+    paths = write_arrays(tmp_path, images)
+    found = find_frames(paths[:1], paths[1:], LAYOUT)
+    assert found.frames[0].same_dn == pytest.approx(0.03 * images[0].mean())
+    assert found.dark[0].same_dn == pytest.approx(3 * 12, rel=0.05)
+
+
 def test_a_frame_counts_once_and_hidden_files_and_pictures_not_at_all(tmp_path, rng):
-    folder = tmp_path / "iso800" / "deeper"
+    folder = tmp_path / "iso100" / "iso800" / "deeper"
     frames = write_arrays(folder, [to_dn(raw) for raw in exposures(rng, scene(), 800, 5)])
     for name in (".DS_Store", "000.JPG", "000.heic", "000.xmp"):
         (folder / name).write_bytes(b"no frame")
-    found = find_frames([tmp_path, *frames], [], LAYOUT)
+    found = find_frames([tmp_path, *frames], [], replace(LAYOUT, iso=None))
     assert [frame.path for frame in found.frames] == frames
     assert {frame.iso for frame in found.frames} == {800}
 
@@ -299,6 +317,42 @@ def test_a_black_level_that_dark_frames_miss_is_noted(tmp_path, rng):
     for stated, is_noted in ((LAYOUT.black_level, False), (LAYOUT.black_level + 6, True)):
         found = calibrate(lit, name="x", dark=dark, layout=replace(LAYOUT, black_level=stated))
         assert any(f"--black-level is {stated}" in note for note in found.notes) == is_noted
+
+
+def test_a_black_level_of_files_that_dark_frames_miss_is_kept(tmp_path, rng):
+    """Of RAW files, which nobody stated: from a DN on, or from their noise on."""
+    for iso, off_dn, is_noted in ((800, 20, True), (12800, 20, False)):
+        clean, covered = (replace(scene(light), black_level=64 + off_dn) for light in (0.8, 0.0))
+        paths = []
+        for name, what in (("lit", clean), ("dark", covered)):
+            folder = tmp_path / f"{name}{iso}"
+            folder.mkdir()
+            for number, raw in enumerate(exposures(rng, what, iso, 4)):
+                dn = to_dn(raw).astype(np.float32)
+                told = replace(raw, mosaic=(dn - 64) / 959, black_level=64)
+                write_dng(folder / f"{number}.dng", told)
+            paths.append(folder)
+        found = calibrate(paths[0], name="x", dark=paths[1])
+        assert any("the files' black level is 64" in note for note in found.notes) == is_noted
+        np.testing.assert_allclose(found.fits[0].black, 64 + off_dn, atol=2)
+
+
+def test_what_happened_in_a_burst_is_said_with_its_size(tmp_path, rng):
+    def notes(name: str, images: list[np.ndarray]) -> str:
+        found = calibrate(write_arrays(tmp_path / name, images), name="x", layout=LAYOUT)
+        k_error = np.max(found.fits[0].k_dn_error / found.fits[0].k_dn)
+        assert (f"k is uncertain by {100 * k_error:.1f} %" in "".join(found.notes)) == (k_error > 0.02)
+        return " ".join(found.notes)
+
+    lamp = replace(scene(), mosaic=0.1 + 0.5 * scene().mosaic)
+    dimmed = replace(lamp, mosaic=np.float32(0.98) * lamp.mosaic)
+    flicker = [to_dn(exposures(rng, what, 800, 1)[0]) for what in (lamp, dimmed) * 3]
+    drift_dn = re.search(r"level of 1 burst drifted by up to ([\d.]+) DN", notes("flicker", flicker))
+    assert float(drift_dn[1]) == pytest.approx(0.02 * 959 * lamp.mosaic.mean(), rel=0.1)
+    fly = [to_dn(raw) for raw in exposures(rng, scene(), 800, 6)]
+    fly[3][40:52, 60:80] = fly[3][40:52, :20]
+    assert f"1 burst, the first one that of {tmp_path}/fly/000.npy: something moved" in notes("fly", fly)
+    assert "k is uncertain" in notes("few", [to_dn(raw) for raw in exposures(rng, scene(side=64), 800, 4)])
 
 
 def test_a_line_that_means_little_is_said(tmp_path, rng):
