@@ -84,3 +84,28 @@ def test_after_k_sigma_the_noise_depends_on_the_signal_alone(rng: np.random.Gene
             assert anchored.mean().item() == pytest.approx(value, rel=0.01)
             assert anchored.var().item() == pytest.approx(ANCHOR_K * value + ANCHOR_SIGMA2, rel=0.03)
             assert (planes == 0).all()
+
+
+@pytest.mark.parametrize("kind", ["stabilise", "k-sigma", "noise-map"])
+def test_the_network_is_told_what_the_formulas_say(kind: str) -> None:
+    """In NumPy, of a camera that is not the anchor: image, planes, and what a residual of 1 makes of it."""
+    x, k, sigma2 = np.linspace(0, 1.2, 7), 4e-3, 3e-5
+    noisy = torch.from_numpy(x).expand(1, 4, 1, 7)
+
+    def vst(x: np.ndarray | float) -> np.ndarray:
+        black = 3 / 8 + sigma2 / k**2
+        return 2 * np.sqrt(x / k + black) - 2 * np.sqrt(black)
+
+    image, planes = network_input(noisy, full(k), full(sigma2), kind)
+    clean = clean_estimate(noisy, torch.ones_like(noisy), full(k), full(sigma2), kind)[0, 0, 0].numpy()
+    deviation = np.sqrt(k * x + sigma2)
+    at_anchor = ANCHOR_K * (x / k + sigma2 / k**2) - ANCHOR_SIGMA2 / ANCHOR_K
+    typical = np.sqrt(ANCHOR_K * 0.1 + ANCHOR_SIGMA2) * k / ANCHOR_K
+    expected = {
+        "stabilise": (2 * vst(x) / vst(1) - 0.5, 40 / vst(1) - 1, vst(clean) - vst(x), 1),
+        "k-sigma": (2 * at_anchor - 0.5, 0, clean - x, typical),
+        "noise-map": (2 * x - 0.5, 20 * deviation - 1, clean - x, deviation),
+    }[kind]
+    np.testing.assert_allclose(image[0, 1, 0], expected[0], rtol=1e-9)
+    np.testing.assert_allclose(planes[0, 1, 0], np.broadcast_to(expected[1], 7), rtol=1e-9)
+    np.testing.assert_allclose(expected[2], np.broadcast_to(expected[3], 7), rtol=1e-9)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ import pytest
 torch = pytest.importorskip("torch")
 
 from fsid.denoise import Denoiser, ModelCard, NetworkConfig, RawDenoiser, denoise_raw  # noqa: E402
+from fsid.denoise.denoise import _denoise_packed, _pooling_patches  # noqa: E402
 from fsid.denoise.nafnet import SpatialMean  # noqa: E402
 from fsid.errors import FsidError  # noqa: E402
 from fsid.sensor import CFA_PATTERNS, NoiseLevel, Raw, load_profile  # noqa: E402
@@ -84,6 +86,28 @@ def test_a_small_image_is_what_the_bare_network_makes_of_it(rng: np.random.Gener
     expected = model.net(torch.from_numpy(packed)[None], k, sigma2)[0].numpy()
     clean = denoise_raw(noisy, model, tile_px=8).mosaic
     np.testing.assert_allclose(clean[::2, 1::2], expected[1], atol=1e-5)
+
+
+def test_averages_are_of_patches_spread_over_the_image() -> None:
+    """About sixteen, each in the middle of its cell of an even grid; pixels carry their own address. What a
+    network is given, and here gives back, is the mean of what it made of them all."""
+    address = np.arange(60 * 200, dtype=np.float32).reshape(1, 60, 200)
+    patches = list(_pooling_patches(address, 10))
+    assert {patch.shape for patch in patches} == {(1, 10, 10)}
+    model = SimpleNamespace(
+        card=SimpleNamespace(patch_px=10),
+        multiple=4,
+        receptive_radius=4,
+        averages=lambda patch, level: patch.mean() ** 2,
+        run=lambda tile, level, averages: np.full_like(tile, averages),
+    )
+    given = _denoise_packed(address, model, LEVEL, 64, lambda *_: None)
+    np.testing.assert_allclose(given, np.mean([patch.mean() ** 2 for patch in patches]), rtol=1e-5)
+    found = [divmod(int(patch[0, 0, 0]), 200) for patch in patches]
+    assert found == [(row, column) for row in (12, 38) for column in (14, 41, 68, 95, 122, 149, 176)]
+    (upright,) = _pooling_patches(address[:, :20, :20], 10)
+    assert upright.shape == (1, 20, 20)
+    assert {patch.shape for patch in _pooling_patches(address[:, :20, :21], 10)} == {(1, 10, 10)}
 
 
 def test_threads_may_share_a_network(rng: np.random.Generator) -> None:
