@@ -107,6 +107,8 @@ def test_a_broken_record_behind_a_near_duplicate_is_named(tmp_path: Path) -> Non
     files[1][1]["json"] = json.dumps(samples[1].record | {"frame": 1, "index": 1}).encode()
     files[2][1]["json"] = b"{"
     write_shard(shard_path(tmp_path, 0), files)
+    for never in (config("images=photos"), config("checks.duplicate_bits=-1")):
+        settle([shard_path(tmp_path, 0)], never, 1, pytest.fail)
     with pytest.raises(FsidError, match=r"shard-00000\.tar: 00000002\.json: is not valid JSON"):
         settle([shard_path(tmp_path, 0)], config(), 1, lambda task: task.do(PaintingWorker()))
 
@@ -209,6 +211,7 @@ def test_alike_are_fingerprints_of_which_at_most_so_many_bits_differ(rng: np.ran
             like = known[[17, 2900]].copy()
             like[:, word] ^= np.uint64(2**bits - 1) << np.uint64(20)
             assert looks.has(like[:1]) == looks.has(like[1:]) == (bits <= 8)
+            assert looks.has(np.concatenate([~known[:1], like[1:]])) == (bits <= 8)  # crops of one frame
         across = known[2900:2901].copy().view(np.uint8)
         across[0, rng.permutation(32)[:bits]] ^= 1
         assert looks.has(across.view(np.uint64)) == (bits <= 8)

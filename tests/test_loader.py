@@ -531,6 +531,18 @@ def test_pixels_that_are_not_what_is_stored_are_refused(tag: tuple, named: str, 
         assert index_mosaics(tmp_path)[0].black_level == 64
 
 
+@pytest.mark.parametrize("how", [{"byteorder": ">"}, {"rowsperstrip": 8}, {"compression": "zlib"}])
+def test_pixels_that_are_no_plain_strip_are_refused(how: dict, tmp_path: Path) -> None:
+    """They are mapped from the file: other bytes would be trained on as noise."""
+    tags = [(33422, "B", 4, (0, 1, 1, 2)), (50714, "H", 1, 64), (50717, "H", 1, 1023)]
+    page, file = np.full((HEIGHT, WIDTH), 300, np.uint16), io.BytesIO()
+    tagged = [(*each, True) for each in tags]
+    tifffile.imwrite(file, page, photometric=32803, extratags=tagged, **({"byteorder": "<"} | how))
+    write_shard(shard_path(tmp_path, 0), [("00000000", {"clean.dng": file.getvalue()})])
+    with pytest.raises(FsidError, match="is not one uncompressed little-endian uint16 strip"):
+        index_mosaics(tmp_path)
+
+
 def addresses(tmp_path: Path, per_shard: tuple[int, ...]) -> Path:
     """Mosaics whose pixels carry their own address, in shards of different sizes."""
     number = 0
@@ -688,6 +700,9 @@ def test_validation_scenes_and_held_out_ones_are_not_drawn(dataset: Path) -> Non
     save_settings(DatasetConfig(0, 2, settings), dataset / "config.yaml")
     assert [mosaic.split for mosaic in index_mosaics(dataset)] == ["train", "train", "validation", "train"]
     assert PatchDataset(dataset, CONFIG, seed=0).mosaics == 3
+    save_settings(DatasetConfig(0, 2, settings, pictures=2), dataset / "config.yaml")
+    of_pictures = [(mosaic.scene, mosaic.split) for mosaic in index_mosaics(dataset)]
+    assert of_pictures == [(0, "train"), (1, "train")] * 2  # the third frame is of the first picture again
     pairs = replace(settings, validation_every=0, noise_levels=2)
     save_settings(DatasetConfig(0, 2, pairs), dataset / "config.yaml")
     assert [mosaic.scene for mosaic in index_mosaics(dataset)] == [0, 0, 1, 1]
