@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import rawpy
 from PIL import Image
+from scipy.ndimage import gaussian_filter
 
 from fsid.cli.main import main
 from fsid.errors import FsidError
@@ -29,7 +30,7 @@ from fsid.evaluate import (
     write_comparison,
     write_results,
 )
-from fsid.evaluate.compare import MOST_DB, Row, confidence
+from fsid.evaluate.compare import MOST_DB, Row, confidence, detailed_window
 from fsid.evaluate.comparison_report import comparison_sections
 from fsid.evaluate.models import model_names
 from fsid.evaluate.report import METRICS, level_label, write_report
@@ -249,6 +250,18 @@ def test_a_broken_capture_is_named_before_anything_is_measured(small_set: Path, 
     with pytest.raises(FsidError, match=f"^{last}: "):
         compare(tmp_path / "set", [Method("mine", "", denoise)])
     assert not measured
+
+
+def test_a_crop_is_of_the_edges_of_things_and_not_of_the_finest_texture():
+    """Upright stripes at the lower right, and pixels black and white in turn at the upper left."""
+    picture = np.full((90, 150, 3), 0.5)
+    picture[:40, :40] = (np.indices((40, 40)).sum(0) % 2)[..., None]
+    picture[50:, 110:] = (np.arange(40) // 10 % 2)[:, None]
+    (rows, columns), detail = detailed_window(picture, 40)
+    assert (rows, columns) == (slice(40, 80), slice(100, 140))
+    grey = gaussian_filter(picture.mean(2), 3)
+    assert detail == pytest.approx(np.hypot(*np.gradient(grey))[rows, columns].mean())
+    assert detailed_window(picture, 500)[0] == (slice(0, 90), slice(0, 150))
 
 
 def test_names_are_text_and_nothing_else(small_set: Path, tmp_path: Path, capsys):

@@ -43,6 +43,7 @@ def test_a_stereo_pair_stands_a_baseline_apart_and_looks_the_same_way():
     np.testing.assert_allclose(axis(left), axis(right), atol=1e-9)
     assert step @ axis(left) == pytest.approx(0, abs=1e-9)
     assert step @ left.up == pytest.approx(0, abs=1e-9)
+    assert step @ np.cross(axis(left), left.up) == pytest.approx(0.06)  # the first eye is the left one
     assert (left.eye, right.eye) == (0, 1)
 
 
