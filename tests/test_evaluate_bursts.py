@@ -13,8 +13,9 @@ from scipy.ndimage import gaussian_filter, shift
 from fsid.cli.main import main
 from fsid.errors import FsidError
 from fsid.evaluate import NOISY, burst_testset, compare, psnr, read_testset, simulated_testset
-from fsid.evaluate.burst_truth import average
-from fsid.evaluate.placing import shift_between
+from fsid.evaluate.beside import _of_like_noise
+from fsid.evaluate.burst_truth import _frames, average
+from fsid.evaluate.placing import Placed, _shown, shift_between
 from fsid.sensor import NoiseLevel, NoiseTerms, Raw, load_profile, noisy_from_clean, read_raw, write_dng
 from fsid.sensor.metadata import ORIENTATION, Metadata, exposure_metadata
 from fsid.sensor.tiff import SHORT, Tag
@@ -197,6 +198,28 @@ def test_whole_shifts_are_undone_and_others_left_out(clean: Raw, tmp_path: Path)
     assert quality.shift_px == pytest.approx(np.hypot(4, 6))
     seen = clean.mosaic[window]
     assert (truth.mosaic - seen)[seen < 0.9].std() < 1.3 * quality.error
+
+
+def test_frames_are_put_back_and_then_brought_to_the_light_of_the_first(clean: Raw, tmp_path: Path):
+    """Less their offset, then over their gain; of a plane that was rolled, what did not come round."""
+    write_dng(tmp_path / "a.dng", clean)
+    stored = read_raw(tmp_path / "a.dng").mosaic
+    placed = Placed(tmp_path / "a.dng", (2, -4), 0.8, 0.05, 0.0, 1.0, (0.0, 0.0))
+    (found,) = _frames([placed], np.s_[2:90, 0:120])
+    np.testing.assert_allclose(found, (stored[:88, 4:124] - 0.05) / 0.8, atol=1e-6)
+    plane = np.arange(80).reshape(8, 10)
+    np.testing.assert_array_equal(np.roll(plane, (2, -3), (0, 1))[_shown(np.array((2, -3)))], plane[:-2, 3:])
+    assert plane[_shown(np.zeros(2, int))].shape == plane.shape
+
+
+@pytest.mark.parametrize("power", [1, 2])
+def test_frames_of_other_light_are_given_the_noise_of_the_first(power: int):
+    """Divided by their gain, shot noise has its variance over that, and read noise over its square."""
+    gains = np.array([0.85, 0.95, 1.0, 1.2])
+    noise = np.random.default_rng(0).standard_normal((4, 50_000))
+    noise /= noise.std(axis=1, keepdims=True)
+    times = _of_like_noise(noise / gains[:, None] ** (power / 2), np.log(gains))
+    np.testing.assert_allclose(times, gains ** (power / 2), rtol=1e-3)
 
 
 def test_a_far_move_over_a_smooth_texture_is_seen():

@@ -32,11 +32,12 @@ from fsid.evaluate import (
 )
 from fsid.evaluate.compare import MOST_DB, Row, confidence, detailed_window
 from fsid.evaluate.comparison_report import comparison_sections
+from fsid.evaluate.metrics import ssim
 from fsid.evaluate.models import model_names
 from fsid.evaluate.report import METRICS, level_label, write_report
 from fsid.evaluate.testset import staged, write_testset
 from fsid.files import write_atomically
-from fsid.sensor import Raw, read_raw, write_dng
+from fsid.sensor import Raw, develop, read_raw, write_dng
 
 
 @pytest.fixture(scope="module")
@@ -104,6 +105,38 @@ def test_a_report_shows_some_of_many_images(
     assert len(comparison.images) == 6
 
 
+def test_figures_are_those_of_their_frames_and_sets(tmp_path: Path):
+    """Two sets of one image and two frames: each metric of its own pictures, the crop that of the first."""
+    root = tmp_path / "set"
+    made = simulated_testset(
+        root,
+        camera="pixel6",
+        isos=[3200],
+        frames=2,
+        scenes=1,
+        width=64,
+        height=64,
+        materials=["fabric", "threads"],
+    )
+    found = compare(root, [NOISY], crop_levels=["iso3200"], crop_px=32)
+    expected = {}
+    for image, crop in zip(made.images, found.crops, strict=True):
+        truth = read_raw(made.clean(root, image, "iso3200"))
+        frames = [read_raw(made.noisy(root, image, "iso3200", n)) for n in range(2)]
+        figures = [
+            (psnr(f.mosaic, truth.mosaic), psnr(develop(f), develop(truth)), ssim(develop(f), develop(truth)))
+            for f in frames
+        ]
+        expected[image.set] = np.mean(figures, axis=0)
+        assert crop.psnr_raw == {"noisy": pytest.approx(figures[0][0])}
+        window, _ = detailed_window(develop(truth), 32)
+        np.testing.assert_array_equal(crop.by_method["noisy"], develop(frames[0])[window])
+    expected["all"] = np.mean([*expected.values()], axis=0)
+    assert {row.set for row in found.rows} == expected.keys()
+    for row in found.rows:
+        np.testing.assert_allclose((row.psnr_raw, row.psnr, row.ssim), expected[row.set], rtol=1e-6)
+
+
 def test_the_truth_scores_perfectly(small_set: Path):
     testset = read_testset(small_set)
     truths = iter(testset.images)
@@ -157,7 +190,8 @@ def test_a_capture_is_developed_with_the_colours_of_its_truth(small_set: Path, t
     shutil.copytree(small_set, tmp_path / "set")
     for capture in read_testset(tmp_path / "set").captures(tmp_path / "set"):
         raw = read_raw(capture)
-        write_dng(capture, dataclasses.replace(raw, white_balance=(1.5, 1.0, 2.4)))
+        colours = {"white_balance": (1.5, 1.0, 2.4), "xyz_to_camera": raw.xyz_to_camera[::-1]}
+        write_dng(capture, dataclasses.replace(raw, **colours))
     assert compare(tmp_path / "set", [NOISY]).rows == compare(small_set, [NOISY]).rows
 
 

@@ -53,7 +53,9 @@ def test_a_gap_is_paired_by_image():
         for model, values in (("full-seed0", {"a": 40.0, "b": 30.0}), ("x-seed0", {"b": 29.0, "a": 40.5}))
         for name, value in values.items()
     ]
+    rows += [ImageRow(model, "iso800", "t", "a", 9.0, 9.0, 0.9) for model in ("full-seed0", "x-seed0")]
     assert sorted(gaps(rows, "full-seed0", "x-seed0", "iso800", "s", "psnr_raw")) == [-0.5, 1.0]
+    assert sorted(gaps(rows, "full-seed0", "x-seed0", "iso800", "all", "psnr_raw")) == [-0.5, 0.0, 1.0]
 
 
 def test_figures_of_two_seeds_have_a_spread_and_gaps_of_their_own(tmp_path: Path):
