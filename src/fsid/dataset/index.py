@@ -11,11 +11,11 @@ from __future__ import annotations
 import hashlib
 import operator
 import tarfile
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal
 
 import numpy as np
 import tifffile
@@ -31,8 +31,7 @@ from fsid.sensor.mosaic import check_cfa
 from fsid.sensor.quantise import check_levels
 from fsid.sensor.raw import NoiseLevel
 from fsid.sensor.tiff import quotients
-
-T = TypeVar("T")
+from fsid.spaced import spaced
 
 _ORIGIN_KEYS = ("crops", "exposures", "noise_levels", "validation_every")
 """Settings that say which scene a sample is from; others may be those of another version of FSID."""
@@ -87,12 +86,6 @@ def some_mosaics(data_dir: Path, limit: int) -> list[StoredMosaic]:
     if not found:
         raise _nothing_in(data_dir, "clean")
     return spaced(found, limit)
-
-
-def spaced(items: Sequence[T], limit: int) -> list[T]:
-    """`items`, of more than `limit` so many, evenly spaced."""
-    at = np.linspace(0, len(items) - 1, min(limit, len(items))).round().astype(int)
-    return [items[i] for i in at]
 
 
 def _nothing_in(data_dir: Path, kind: MosaicKind) -> FsidError:

@@ -21,6 +21,7 @@ from fsid.sensor.calibrate import LINEAR_SHARE, NoiseFit
 from fsid.sensor.camera_fit import Calibration
 from fsid.sensor.camera_profile import MONO, CameraProfile
 from fsid.sensor.mosaic import SITES
+from fsid.spaced import spaced
 
 COLOURS = ("tab:red", "tab:green", "tab:olive", "tab:blue")
 PICTURES = (".png", ".pdf", ".svg")
@@ -59,7 +60,7 @@ def check_profile(path: Path, frames: Collection[Path], plot: Path | None) -> No
 def calibration_picture(calibration: Calibration, suffix: str) -> bytes:
     """The picture as a file of the kind `suffix`, one of `PICTURES`."""
     profile, fits = calibration.profile, calibration.fits
-    chosen = np.unique(np.linspace(0, len(fits) - 1, min(len(fits), _MAX_COLUMNS)).round().astype(int))
+    chosen = spaced(range(len(fits)), _MAX_COLUMNS)
     laws = len(fits) > 1
     figure = Figure(figsize=(4.6 * (len(chosen) + laws), 7), layout="constrained")
     axes = figure.subplots(2, len(chosen) + laws, squeeze=False)
