@@ -11,7 +11,8 @@ import signal
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from inspect import cleandoc
+from difflib import get_close_matches
+from inspect import cleandoc, signature
 from types import FrameType
 from typing import NoReturn, TextIO
 
@@ -136,7 +137,7 @@ def _run(arguments: Sequence[str] | None) -> None:
         print(f"fsid {__version__}")
         return
     try:
-        _check_repeated(sys.argv[1:] if arguments is None else arguments)
+        _check_options(sys.argv[1:] if arguments is None else arguments)
         for command in COMMANDS.values():
             command.__doc__ = _flowing(command.__doc__ or "")
         tyro.extras.subcommand_cli_from_dict(
@@ -186,14 +187,25 @@ def _is_read(stream: TextIO) -> bool:
     return not poll.poll(0)
 
 
-def _check_repeated(arguments: Sequence[str]) -> None:
-    """Refuse an option that is given twice: of `--set a=1 --set b=2` the first would be lost."""
+def _check_options(arguments: Sequence[str]) -> None:
+    """Refuse an option that its command has not, and one that is given twice.
+
+    Of `--set a=1 --set b=2` the parser would lose the first, and of `--cuont 3 OUT` it would miss OUT.
+    """
     names = [
         argument.partition("=")[0].replace("_", "-")
         for argument in arguments
         if argument.startswith("-") and argument.lstrip("-")[:1].isalpha()
     ]
+    command = COMMANDS.get(arguments[0]) if arguments else None
+    parameters = signature(command).parameters.values() if command else ()
+    known = {"--help", *(f"--{p.name.replace('_', '-')}" for p in parameters if p.kind is p.KEYWORD_ONLY)}
+    known |= {"-h", "-o"} if "--output" in known else {"-h"}
     for name in names:
+        if command and name not in known:
+            near = get_close_matches(name, sorted(known), n=1)
+            hint = f"did you mean {near[0]}?" if near else f"see fsid {arguments[0]} --help"
+            raise FsidError(f"{name}: fsid {arguments[0]} has no such option; {hint}")
         if names.count(name) > 1 and name not in REPEATABLE:
             raise FsidError(f"{name}: is given twice; several values go behind one {name}")
 
