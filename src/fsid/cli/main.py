@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import io
+import logging
 import os
 import re
 import select
@@ -86,6 +87,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run one command, in the main thread; exit code 0 when done, 2 for bad input or a full disk, 130 after
     Ctrl-C, 143 after SIGTERM, 129 after SIGHUP, 141 when nobody reads on."""
     _open_closed()
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it warns of its own cache without a home folder
     _received.clear()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # a file's name may be no text in its encoding
