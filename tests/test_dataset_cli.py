@@ -22,7 +22,8 @@ from fsid.cli.progress import progress_bar
 from fsid.config import read_yaml
 from fsid.dataset import Workforce, contact_sheet, generate_config, make_only, shard_path, write_shard
 from fsid.dataset.index import index_mosaics
-from fsid.dataset.sample import make_sample, to_uint8
+from fsid.dataset.png import to_uint8
+from fsid.dataset.sample import make_sample
 from fsid.dataset.shards import read_samples
 from fsid.errors import FsidError
 from fsid.scene import SceneConfig

@@ -15,7 +15,7 @@ from fsid.config import load_settings
 from fsid.dataset import GenerateConfig, encode, make_frame, make_sample, remake, shard_path, write_shard
 from fsid.dataset.checks import distance, fingerprint, flaw
 from fsid.dataset.config import Checks, split_of
-from fsid.dataset.settle import REDRAWS, Looks, Settle, settle
+from fsid.dataset.near_duplicates import REDRAWS, Looks, Settle, settle
 from fsid.dataset.shards import read_records, read_samples
 from fsid.errors import FsidError
 from fsid.scene import Scene

@@ -43,8 +43,8 @@ from fsid.dataset import (
 )
 from fsid.dataset.attempt import Attempt
 from fsid.dataset.generate import _Shard
+from fsid.dataset.near_duplicates import settle
 from fsid.dataset.sample import Sample
-from fsid.dataset.settle import settle
 from fsid.dataset.shards import find_shards, read_samples
 from fsid.dataset.worker import Worker
 from fsid.errors import FsidError

@@ -19,9 +19,9 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 from fsid.config import given_keys, load_settings
 from fsid.dataset import GenerateConfig, Sample, check_given, encode, make_sample, pictures, read_photo
 from fsid.dataset.attempt import _half_precision
-from fsid.dataset.given import _FIXED, _NEEDS
 from fsid.dataset.pictures import check_pictures, find_pictures, read_exr
 from fsid.dataset.tasks import BURST_FRAMES, scene_config, smaller, views_of_scene
+from fsid.dataset.unused_settings import _FIXED, _NEEDS
 from fsid.errors import FsidError
 from fsid.render import Renderer
 from fsid.scene import Scene, sample

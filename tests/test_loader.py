@@ -24,13 +24,13 @@ torch = pytest.importorskip("torch")
 
 from fsid.config import save_settings  # noqa: E402
 from fsid.dataset import index  # noqa: E402
-from fsid.dataset.cells import Grid  # noqa: E402
 from fsid.dataset.config import DatasetConfig, GenerateConfig  # noqa: E402
 from fsid.dataset.feed import batches  # noqa: E402
 from fsid.dataset.index import index_mosaics  # noqa: E402
-from fsid.dataset.levels import LevelTable  # noqa: E402
 from fsid.dataset.loader import Batch, PatchConfig, PatchDataset, packed, window_rand  # noqa: E402
-from fsid.dataset.order import shuffled  # noqa: E402
+from fsid.dataset.noise_levels import LevelTable  # noqa: E402
+from fsid.dataset.patch_grid import Grid  # noqa: E402
+from fsid.dataset.permutation import shuffled  # noqa: E402
 from fsid.dataset.shards import read_samples, shard_path, write_shard  # noqa: E402
 from fsid.errors import FsidError  # noqa: E402
 from fsid.sensor import (  # noqa: E402

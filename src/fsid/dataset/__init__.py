@@ -2,6 +2,7 @@
 
 from fsid.dataset.attempt import Sample, sample_key
 from fsid.dataset.config import RENDERED, DatasetConfig, GenerateConfig, generate_config
+from fsid.dataset.contact_sheet import contact_sheet, grid
 from fsid.dataset.estimate import Estimate, estimate
 from fsid.dataset.generate import (
     Workforce,
@@ -11,13 +12,13 @@ from fsid.dataset.generate import (
     is_begun,
     pairs_to_make,
 )
-from fsid.dataset.given import check_given
-from fsid.dataset.only import make_only
 from fsid.dataset.photos import find_photos, read_photo
-from fsid.dataset.picture import check_png, contact_sheet, grid, save_png
 from fsid.dataset.pictures import check_pictures, find_pictures
-from fsid.dataset.sample import encode, make_frame, make_sample, remake, to_uint8
+from fsid.dataset.png import check_png, save_png, to_uint8
+from fsid.dataset.sample import encode, make_frame, make_sample, remake
 from fsid.dataset.shards import find_shards, read_member, shard_keys, shard_path, write_shard
+from fsid.dataset.single_sample import make_only
+from fsid.dataset.unused_settings import check_given
 from fsid.dataset.worker import rendering
 
 __all__ = [

@@ -24,8 +24,9 @@ from fsid.assets.file_names import PREFIX
 from fsid.assets.sources import split_source, survey_meshes
 from fsid.counted import counted
 from fsid.dataset.config import DATASET_FILE, DatasetConfig
+from fsid.dataset.contact_sheet import grid
 from fsid.dataset.index import some_mosaics
-from fsid.dataset.picture import grid, stored_preview
+from fsid.dataset.png import stored_preview
 from fsid.dataset.shards import read_records, records_of, shard_keys
 from fsid.errors import FsidError
 from fsid.files import check_file, write_atomically

@@ -20,6 +20,7 @@ from fsid.config import check_fields, from_plain, read_yaml, save_settings, to_p
 from fsid.dataset.card import CARD, check_card, write_card
 from fsid.dataset.config import DATASET_FILE, RENDERED, DatasetConfig, GenerateConfig
 from fsid.dataset.crew import Crew, LocalCrew, run
+from fsid.dataset.near_duplicates import Looks, Settle, settle
 from fsid.dataset.origins import (
     as_far_as_known,
     check_same_origins,
@@ -30,7 +31,6 @@ from fsid.dataset.origins import (
 )
 from fsid.dataset.pictures import find_pictures, pictures_digest
 from fsid.dataset.sample import encode, make_frame
-from fsid.dataset.settle import Looks, Settle, settle
 from fsid.dataset.shards import count_whole, each_sample, remove_parts, shard_path, write_shard
 from fsid.dataset.tasks import SceneRenderer, check_cameras, check_task
 from fsid.dataset.worker import Worker

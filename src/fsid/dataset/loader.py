@@ -3,8 +3,8 @@
     noisy = DN(clean + sqrt(k clean + sigma2 - r) n),    n ~ N(0, 1),    DN: round and clip as the camera's
     converter does, which adds r = 1/12 DN^2
 
-**Epochs.** A mosaic is cut into a grid of patches, and those of all mosaics come in a random order (`cells`).
-With W ranks of batch B, the places of an epoch are dealt out in turn:
+**Epochs.** A mosaic is cut into a grid of patches, and those of all mosaics come in a random order
+(`patch_grid`). With W ranks of batch B, the places of an epoch are dealt out in turn:
 
     place = (step W + rank) B + slot
 
@@ -42,9 +42,9 @@ from torch.utils.data import Dataset
 
 from fsid.config import check_fields
 from fsid.counted import counted
-from fsid.dataset.cells import Cell, Grid, check_shrink, shrink_for
 from fsid.dataset.index import StoredMosaic, index_mosaics
-from fsid.dataset.levels import LevelTable
+from fsid.dataset.noise_levels import LevelTable
+from fsid.dataset.patch_grid import Cell, Grid, check_shrink, shrink_for
 from fsid.errors import FsidError
 from fsid.sensor.formula import stored, with_noise
 from fsid.sensor.gaussian import standard_normal

@@ -19,6 +19,7 @@ from PIL import Image
 from fsid.config import from_plain
 from fsid.dataset.attempt import Attempt, Sample, sample_key
 from fsid.dataset.config import GenerateConfig
+from fsid.dataset.png import to_uint8
 from fsid.dataset.tasks import SceneRenderer
 from fsid.errors import FsidError, check_kind, whole
 from fsid.scene import scene_from_json
@@ -129,22 +130,6 @@ def _further_file(name: str, content: Raw | np.ndarray) -> tuple[str, bytes]:
     file = io.BytesIO()
     np.save(file, content, allow_pickle=False)
     return f"{name}.npy", file.getvalue()
-
-
-def to_uint8(srgb: np.ndarray) -> np.ndarray:
-    """(..., 3) sRGB-encoded 0..1 as 8-bit values, what is beyond clipped; 8-bit ones as they are.
-
-    FsidError for other integers, whose range nothing tells, and for NaN.
-    """
-    if srgb.dtype == np.uint8:
-        return srgb
-    if srgb.dtype.kind != "f":
-        raise FsidError(f"a picture of {srgb.dtype} values: give sRGB values in 0..1, or 8-bit ones (uint8)")
-    if np.isnan(np.min(srgb, initial=0)):
-        raise FsidError("a picture holds NaN; give sRGB values in 0..1")
-    levels = np.clip(srgb, 0.0, 1.0)
-    levels *= 255.0
-    return np.round(levels, out=levels).astype(np.uint8)
 
 
 def _dng(raw: Raw) -> bytes:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Literal
 
 from fsid.config import Override, check_fields, load_named
-from fsid.dataset.cells import check_shrink
+from fsid.dataset.patch_grid import check_shrink
 from fsid.denoise.raw_denoiser import MAX_PATCH_PX, NetworkConfig
 from fsid.errors import FsidError
 

@@ -27,7 +27,7 @@ from fsid.dataset import (
     shard_keys,
     to_uint8,
 )
-from fsid.dataset.picture import stored_preview
+from fsid.dataset.png import stored_preview
 from fsid.denoise import TrainConfig, load_history, train, train_config
 from fsid.errors import FsidError
 from fsid.evaluate.claim import claimed

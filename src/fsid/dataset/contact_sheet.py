@@ -1,45 +1,20 @@
-"""Pictures for people: PNG files and contact sheets of scenes."""
+"""Contact sheets: many pictures side by side in one."""
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
-from PIL import Image
 
 from fsid.dataset.config import GenerateConfig
-from fsid.dataset.sample import make_sample, to_uint8
-from fsid.dataset.shards import read_member
+from fsid.dataset.png import to_uint8
+from fsid.dataset.sample import make_sample
 from fsid.dataset.worker import rendering
 from fsid.errors import FsidError, whole
-from fsid.files import check_output, write_atomically
 from fsid.sensor import develop
 
 GAP_PX = 4
-
-
-def save_png(path: str | Path, srgb: np.ndarray) -> None:
-    """Write a (H, W, 3) sRGB image, 0..1 float or uint8, as PNG.
-
-    FsidError where it cannot be written, is of another shape, or is none that `to_uint8` takes.
-    """
-    check_png(path)
-    if srgb.ndim != 3 or srgb.shape[2] != 3 or not srgb.size:
-        raise FsidError(f"{path}: a picture must have shape (height, width, 3); got {srgb.shape}")
-    buffer = io.BytesIO()
-    Image.fromarray(to_uint8(srgb)).save(buffer, "PNG")
-    write_atomically(Path(path), buffer.getvalue())
-
-
-def check_png(path: str | Path) -> None:
-    """FsidError unless `path` names a PNG file that can be written."""
-    path = Path(path)
-    if path.suffix.lower() != ".png":
-        raise FsidError(f"{path}: pictures are written as .png")
-    check_output(path)
 
 
 def contact_sheet(
@@ -72,17 +47,6 @@ def contact_sheet(
 def _half(image: np.ndarray) -> np.ndarray:
     """(2h, 2w, C) to (h, w, C) by averaging."""
     return np.asarray(image.reshape(len(image) // 2, 2, -1, 2, image.shape[2]).mean((1, 3)))
-
-
-def stored_preview(shard: Path, key: str) -> Image.Image:
-    """The preview of a sample, RGB. FsidError where it is no PNG, whatever else Pillow might make of it."""
-    name = f"{key}.rgb.png"
-    try:
-        return Image.open(io.BytesIO(read_member(shard, name)), formats=("PNG",)).convert("RGB")
-    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
-        raise FsidError(
-            f"{shard}: {name}: is no readable PNG ({error}); delete it and generate again"
-        ) from None
 
 
 def grid(tiles: Iterable[np.ndarray]) -> np.ndarray:

@@ -2,8 +2,8 @@
 
     cells of a mosaic of H x W pixels = (H / shrink) // pitch by (W / shrink) // pitch
 
-The cells start elsewhere in every epoch, and those of all mosaics come in a random order (`order`). One tile
-more than a patch lies in a cell, for the shift of a mirrored window.
+The cells start elsewhere in every epoch, and those of all mosaics come in a random order (`permutation`). A
+cell is one tile larger than a patch, for the shift of a mirrored window.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from statistics import median
 import numpy as np
 
 from fsid.dataset.index import StoredMosaic
-from fsid.dataset.order import mixed, shuffled
+from fsid.dataset.permutation import mixed, shuffled
 from fsid.errors import FsidError
 
 _LEAST_PX = 480

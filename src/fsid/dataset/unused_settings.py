@@ -1,7 +1,7 @@
-"""What a command asks for and would not get is refused, so that nobody trains on other data than was meant.
+"""Settings that have no effect are refused, so that nobody trains on other data than was meant.
 
-Only what is given one by one counts, `--set` and options: a file states many settings that have no effect, as
-every dataset's own config.yaml does.
+Only settings that are given one by one count, by `--set` and options: a file states many that have no effect,
+as every dataset's own config.yaml does.
 """
 
 from __future__ import annotations
