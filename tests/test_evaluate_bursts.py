@@ -13,9 +13,9 @@ from scipy.ndimage import gaussian_filter, shift
 from fsid.cli.main import main
 from fsid.errors import FsidError
 from fsid.evaluate import NOISY, burst_testset, compare, psnr, read_testset, simulated_testset
-from fsid.evaluate.beside import _of_like_noise
+from fsid.evaluate.alignment import Alignment, _shown, shift_between
 from fsid.evaluate.burst_truth import _frames, average
-from fsid.evaluate.placing import Placed, _shown, shift_between
+from fsid.evaluate.misalignment import _of_like_noise
 from fsid.sensor import NoiseLevel, NoiseTerms, Raw, load_profile, noisy_from_clean, read_raw, write_dng
 from fsid.sensor.metadata import ORIENTATION, Metadata, exposure_metadata
 from fsid.sensor.tiff import SHORT, Tag
@@ -204,8 +204,8 @@ def test_frames_are_put_back_and_then_brought_to_the_light_of_the_first(clean: R
     """Less their offset, then over their gain; of a plane that was rolled, what did not come round."""
     write_dng(tmp_path / "a.dng", clean)
     stored = read_raw(tmp_path / "a.dng").mosaic
-    placed = Placed(tmp_path / "a.dng", (2, -4), 0.8, 0.05, 0.0, 1.0, (0.0, 0.0))
-    (found,) = _frames([placed], np.s_[2:90, 0:120])
+    aligned = Alignment(tmp_path / "a.dng", (2, -4), 0.8, 0.05, 0.0, 1.0, (0.0, 0.0))
+    (found,) = _frames([aligned], np.s_[2:90, 0:120])
     np.testing.assert_allclose(found, (stored[:88, 4:124] - 0.05) / 0.8, atol=1e-6)
     plane = np.arange(80).reshape(8, 10)
     np.testing.assert_array_equal(np.roll(plane, (2, -3), (0, 1))[_shown(np.array((2, -3)))], plane[:-2, 3:])

@@ -21,17 +21,17 @@ from fsid.cli.main import main
 from fsid.cli.progress import progress_bar
 from fsid.config import read_yaml, save_settings
 from fsid.errors import FsidError
-from fsid.evaluate.claim import claimed
 from fsid.evaluate.compare import NOISY, ImageRow, Method, summarise, write_images
 from fsid.evaluate.dead_leaves import RADIUS_PX, dead_leaves_rand, write_dead_leaves
 from fsid.evaluate.demo import ISOS, DemoConfig, _copy_photographs
 from fsid.evaluate.experiment_config import PHOTOGRAPHS, SOURCES, scale_config
 from fsid.evaluate.experiment_report import gaps, write_experiment_report
 from fsid.evaluate.experiments import TEST_ISOS, _data, _read_images, _testsets, _training
-from fsid.evaluate.known import known_pictures
 from fsid.evaluate.plots import loss_plot
+from fsid.evaluate.resumable_folder import claimed
 from fsid.evaluate.simulated import LUXES
 from fsid.evaluate.testset import TestImage, TestSet, levels_of
+from fsid.evaluate.train_test_overlap import copies_in_training
 from fsid.sensor import load_profile, save_profile
 
 SMOKE = ("--scale", "smoke", "--count", "2", "--steps", "3", "--quiet")
@@ -144,8 +144,8 @@ def test_test_photographs_that_were_trained_on_are_found_as_copies(photos: Path,
     seen.resize((131, 105)).save(smaller, quality=70)
     Image.fromarray(data.astronaut()[:160, :200]).save(other)
     tests = [turned, smaller, blank, other, tmp_path / "missing.png"]
-    assert known_pictures(tests, [*training[:2], blank], 2) == []
-    assert known_pictures(tests, [*training, blank], 2) == [(smaller, training[2])]
+    assert copies_in_training(tests, [*training[:2], blank], 2) == []
+    assert copies_in_training(tests, [*training, blank], 2) == [(smaller, training[2])]
 
 
 def test_a_demo_is_gone_on_with_by_the_same_command_alone(tmp_path: Path, refused):

@@ -5,10 +5,10 @@
                                                     half of the second: the noise of the first frame
 
 g_f is the flicker of the light, o_f the drift of the black level; a frame that moved is shifted back where
-the shift is a whole number of CFA tiles (`placing`), and left out where it is not, since interpolating would
-blur the truth. By what is left, less than a sixth of a tile or hidden by noise, the first frame lies beside
-the truth, which is blurred by it: the third part of the error (`beside`). The light that noise has where DN 0
-or the white level cuts it off is taken out (`cut_off`).
+the shift is a whole number of CFA tiles (`alignment`), and left out where it is not, since interpolating
+would blur the truth. By what is left, less than a sixth of a tile or hidden by noise, the first frame lies
+beside the truth, which is blurred by it: the third part of the error (`misalignment`). The light that noise
+has where DN 0 or the white level cuts it off is taken out (`clipping_bias`).
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from pathlib import Path
 import numpy as np
 from scipy.ndimage import uniform_filter
 
-from fsid.evaluate.beside import Departure, beside2
-from fsid.evaluate.cut_off import before_cut_off
-from fsid.evaluate.placing import LEAST_FRAMES, Placed, Window, place, read_first, too_few
+from fsid.evaluate.alignment import LEAST_FRAMES, Alignment, Window, align, read_first, too_few
+from fsid.evaluate.clipping_bias import unclipped
+from fsid.evaluate.misalignment import Departure, misalignment2
 from fsid.sensor import Raw, read_raw
 from fsid.sensor.dng import read_stored
 from fsid.sensor.mosaic import TILE
@@ -56,53 +56,53 @@ class TruthQuality:
 def average(
     paths: Sequence[Path], reference: Path, image: str = "", level: str = ""
 ) -> tuple[Raw, TruthQuality, Window]:
-    """The robust mean of the frames at `paths`, placed on the frame `reference`; reads every file thrice.
+    """The robust mean of the frames at `paths`, aligned with the frame `reference`; reads every file thrice.
 
     The window is that of `reference` which all frames show; the mean is of it.
     """
     first = read_first(reference)
-    every = [place(path, first) for path in paths]
-    placed = [p for p in every if not p.fault]
-    if len(placed) < LEAST_FRAMES:
+    every = [align(path, first) for path in paths]
+    aligned = [p for p in every if not p.fault]
+    if len(aligned) < LEAST_FRAMES:
         raise too_few(reference, every)
-    window = _common_window(placed, first)
+    window = _common_window(aligned, first)
     seen = cut(first, window)
-    mean = _trimmed_mean(placed, window, seen, _of_dn_0(reference)[window])
-    shared2 = float(np.mean([p.error2 for p in placed])) / 2
-    error = float(np.sqrt(mean.noise2 + shared2 + mean.beside2))
+    mean = _trimmed_mean(aligned, window, seen, _of_dn_0(reference)[window])
+    shared2 = float(np.mean([p.error2 for p in aligned])) / 2
+    error = float(np.sqrt(mean.noise2 + shared2 + mean.misalignment2))
     quality = TruthQuality(
         image=image,
         level=level,
-        frames=len(placed),
-        left_out=len(paths) - len(placed),
+        frames=len(aligned),
+        left_out=len(paths) - len(aligned),
         error=error,
         psnr=float(-20 * np.log10(max(error, 1e-9))),
         outliers=mean.outliers,
-        flicker=max(abs(p.gain - 1) for p in placed),
-        shift_px=float(max(np.hypot(*p.roll) for p in placed)),
+        flicker=max(abs(p.gain - 1) for p in aligned),
+        shift_px=float(max(np.hypot(*p.roll) for p in aligned)),
     )
     return replace(seen, mosaic=mean.truth, noise=None), quality, window
 
 
 @dataclass(frozen=True, eq=False)
 class _Mean:
-    """truth: (H, W) float32. outliers: share of samples left out. noise2, beside2: mean squares of the noise
-    that is left in it, and of how far the first frame lies beside it."""
+    """truth: (H, W) float32. outliers: share of samples left out. noise2, misalignment2: mean squares of the
+    noise that is left in it, and of how far the first frame lies beside it."""
 
     truth: np.ndarray
     outliers: float
     noise2: float
-    beside2: float
+    misalignment2: float
 
 
-def _trimmed_mean(placed: Sequence[Placed], window: Window, first: Raw, lowest: np.ndarray) -> _Mean:
+def _trimmed_mean(aligned: Sequence[Alignment], window: Window, first: Raw, lowest: np.ndarray) -> _Mean:
     """lowest: (H, W) x of DN 0."""
-    mean, variance = _moments(placed, window)
+    mean, variance = _moments(aligned, window)
     used, total, square = (np.zeros(mean.shape) for _ in range(3))
     departures = []
-    for x in _frames(placed, window):
+    for x in _frames(aligned, window):
         deviation = x - mean
-        kept = _is_like_the_others(deviation, variance, len(placed))
+        kept = _is_like_the_others(deviation, variance, len(aligned))
         used += kept
         total += np.where(kept, deviation, 0)
         square += np.where(kept, deviation**2, 0)
@@ -112,14 +112,14 @@ def _trimmed_mean(placed: Sequence[Placed], window: Window, first: Raw, lowest: 
     unlike = float(np.mean(spread**2) / max(np.mean(spread) ** 2, 1e-30))
     reach = SPECK_SIGMA * np.sqrt(_mean_of_site(variance))
     off = Departure.of(change)
-    others, gains = [departure.less(off) for departure in departures], [p.gain for p in placed]
+    others, gains = [departure.less(off) for departure in departures], [p.gain for p in aligned]
     beside = Departure.of((first.mosaic - mean - change).clip(-reach, reach))
     truth, slope = _uncut(mean + change, spread, lowest, first.white_level - first.black_level)
     return _Mean(
         truth=truth.astype(np.float32),
-        outliers=float(1 - used.mean() / len(placed)),
+        outliers=float(1 - used.mean() / len(aligned)),
         noise2=float(np.mean(slope**2 * spread / np.maximum(used, 1))),
-        beside2=beside2(beside, others, gains, unlike),
+        misalignment2=misalignment2(beside, others, gains, unlike),
     )
 
 
@@ -130,8 +130,8 @@ def _uncut(
     variance over frames. The slope is 0 where light is above white, which PSNR does not know."""
     near_dn2 = span**2 * _mean_of_site(variance)
     up_dn, down_dn = span * (mean - lowest), span * (1 - mean)
-    light_dn, slope = before_cut_off(up_dn, _mean_of_site(up_dn), near_dn2)
-    shade_dn, slope_at_white = before_cut_off(down_dn, _mean_of_site(down_dn), near_dn2)
+    light_dn, slope = unclipped(up_dn, _mean_of_site(up_dn), near_dn2)
+    shade_dn, slope_at_white = unclipped(down_dn, _mean_of_site(down_dn), near_dn2)
     light = mean + (light_dn - up_dn - shade_dn + down_dn) / span
     return light, slope * np.where(shade_dn < 0, 0, slope_at_white)
 
@@ -142,10 +142,10 @@ def _of_dn_0(path: Path) -> np.ndarray:
     return stored.black.normalised(np.zeros_like(stored.dn), stored.black_level, stored.white_level)
 
 
-def _common_window(placed: Sequence[Placed], first: Raw) -> Window:
+def _common_window(aligned: Sequence[Alignment], first: Raw) -> Window:
     """Rows and columns of `first` that every frame has once it is put back."""
     height, width = first.mosaic.shape
-    rolls = np.array([(0, 0), *(p.roll for p in placed)])
+    rolls = np.array([(0, 0), *(p.roll for p in aligned)])
     (top, left), (bottom, right) = rolls.max(axis=0), rolls.min(axis=0)
     return slice(top, height + bottom), slice(left, width + right)
 
@@ -157,21 +157,21 @@ def cut(raw: Raw, window: Window) -> Raw:
     return replace(raw, mosaic=mosaic, metadata=raw.metadata.within(width, height))
 
 
-def _frames(placed: Sequence[Placed], window: Window) -> Iterator[np.ndarray]:
+def _frames(aligned: Sequence[Alignment], window: Window) -> Iterator[np.ndarray]:
     """What the frames, in place, have in the window, without flicker and drift."""
-    for p in placed:
+    for p in aligned:
         rolled = np.roll(read_raw(p.path).mosaic, p.roll, axis=(0, 1))[window]
         yield (rolled - np.float32(p.offset)) / np.float32(p.gain)
 
 
-def _moments(placed: Sequence[Placed], window: Window) -> tuple[np.ndarray, np.ndarray]:
+def _moments(aligned: Sequence[Alignment], window: Window) -> tuple[np.ndarray, np.ndarray]:
     """Mean and variance over the frames, pixel by pixel (Welford 1962)."""
     mean = square = np.zeros(())
-    for count, x in enumerate(_frames(placed, window), 1):
+    for count, x in enumerate(_frames(aligned, window), 1):
         delta = x - mean
         mean = mean + delta / count
         square = square + delta * (x - mean)
-    return mean, square / (len(placed) - 1)
+    return mean, square / (len(aligned) - 1)
 
 
 def _is_like_the_others(deviation: np.ndarray, variance: np.ndarray, frames: int) -> np.ndarray:

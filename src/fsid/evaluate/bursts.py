@@ -18,8 +18,8 @@ from pathlib import Path
 
 from fsid.counted import counted
 from fsid.errors import FsidError
+from fsid.evaluate.alignment import LEAST_FRAMES, align, read_first
 from fsid.evaluate.burst_truth import TruthQuality, average, cut
-from fsid.evaluate.placing import LEAST_FRAMES, place, read_first
 from fsid.evaluate.testset import Progress, TestImage, TestSet, staged, write_testset
 from fsid.files import write_atomically
 from fsid.sensor import (
@@ -132,8 +132,8 @@ def _noisy_frames(paths: Sequence[Path], frames: int) -> list[Path]:
     for path in paths[1:]:
         if len(found) == frames:
             break
-        placed = place(path, first)
-        if not placed.fault and placed.roll == (0, 0) and abs(placed.brightness - 1) <= MAX_NOISY_FLICKER:
+        aligned = align(path, first)
+        if not aligned.fault and aligned.roll == (0, 0) and abs(aligned.brightness - 1) <= MAX_NOISY_FLICKER:
             found.append(path)
     if len(found) < frames:
         raise FsidError(

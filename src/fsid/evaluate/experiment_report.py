@@ -33,12 +33,12 @@ def write_experiment_report(
     pairs: Mapping[str, int],
     rows: Sequence[Row],
     images: Sequence[ImageRow],
-    known: str = "",
+    overlap: str = "",
 ) -> Path:
     """Gaps of "full" to its rivals, the means over seeds with their spread, and plots; one file.
 
-    pairs: how many every source has, in the order of the tables. known: what is said of test photographs that
-    a rival has seen.
+    pairs: how many every source has, in the order of the tables. overlap: what is said of test photographs
+    that a rival has seen.
     """
     results = _Results(config.seeds, tuple(pairs), tuple(rows), tuple(images))
     materials = results.levels[ALL_SETS]
@@ -48,7 +48,7 @@ def write_experiment_report(
     if single:
         sections.append(_by_material(results, single))
     title = "FSID: ablation" if config.kind == "ablation" else "FSID: synthetic against real"
-    said = [f"{line}." for line in (known, perfect_note(images)) if line]
+    said = [f"{line}." for line in (overlap, perfect_note(images)) if line]
     write_report(file, title, " ".join([_lead(config, pairs), *said]), sections)
     return file
 

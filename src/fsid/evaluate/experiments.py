@@ -33,7 +33,6 @@ from fsid.dataset.pictures import picture_faults, pictures_digest
 from fsid.denoise import TrainConfig, train, train_config
 from fsid.denoise.run_folder import check_same_training
 from fsid.errors import FsidError, refuse_any
-from fsid.evaluate.claim import claimed
 from fsid.evaluate.compare import (
     CLASSICAL,
     NOISY,
@@ -56,10 +55,11 @@ from fsid.evaluate.experiment_config import (
     set_name,
 )
 from fsid.evaluate.experiment_report import write_experiment_report
-from fsid.evaluate.known import known_note
 from fsid.evaluate.models import model_method
+from fsid.evaluate.resumable_folder import claimed
 from fsid.evaluate.simulated import LUXES, simulated_testset
 from fsid.evaluate.testset import TESTSET_FILE, levels_of, photo_testset, read_testset
+from fsid.evaluate.train_test_overlap import overlap_note
 from fsid.files import make_folder, read_whole
 from fsid.scene import VARIANTS
 from fsid.sensor import load_bayer_profile
@@ -100,9 +100,9 @@ def experiment(
 def _run(
     out: Path, config: ExperimentConfig, bar: ProgressBar, workers: int, note: Callable[[str], None]
 ) -> Path:
-    known = _known(config, workers)
-    if known:
-        note(f"note: {known}")
+    overlap = _overlap(config, workers)
+    if overlap:
+        note(f"note: {overlap}")
     testsets = _testsets(out, config, bar)
     rows, images = _measured(out / "baselines", [NOISY, CLASSICAL], testsets, bar)
     for source, seed in product(SOURCES[config.kind], config.seeds):
@@ -120,7 +120,7 @@ def _run(
     write_results(rows, out / "results.json")
     write_images(images, out / "images.csv")
     pairs = {source: _count(config, source) for source in SOURCES[config.kind]}
-    return write_experiment_report(out / "report.html", config, pairs, rows, images, known)
+    return write_experiment_report(out / "report.html", config, pairs, rows, images, overlap)
 
 
 def _check(out: Path, config: ExperimentConfig, bar: ProgressBar, workers: int) -> None:
@@ -151,13 +151,13 @@ def _check(out: Path, config: ExperimentConfig, bar: ProgressBar, workers: int) 
     refuse_any(faults, counted(len(tests) + len(photos), "picture"))
 
 
-def _known(config: ExperimentConfig, workers: int) -> str:
+def _overlap(config: ExperimentConfig, workers: int) -> str:
     """Which test photographs the real rival is trained on, for note and report."""
     if PHOTOGRAPHS not in SOURCES[config.kind]:
         return ""
     tests = {set_name(folder): find_photos(folder) for folder in config.tests}
     threads = max(min(workers, os.cpu_count() or 1), 1)
-    return known_note(tests, find_pictures(Path(config.photos)), threads)
+    return overlap_note(tests, find_pictures(Path(config.photos)), threads)
 
 
 def _check_trainings(out: Path, config: ExperimentConfig) -> None:

@@ -1,4 +1,4 @@
-"""A folder that is gone on with by the same command holds one experiment: its settings are in it."""
+"""The folder of a demo or an experiment, which the same command continues: it holds one, and its settings."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from fsid.files import held
 
 @contextmanager
 def claimed(out: Path, config: Any, what: str) -> Iterator[None]:
-    """`out` is the folder of `config`, in `what`.yaml, and this process's until the end of the block.
+    """`out` is the folder of `config`, which `what`.yaml in it holds, and this process's until the end of the
+    block. what: demo or experiment.
 
     FsidError where it holds another `what`, or where another process is at work in it.
     """

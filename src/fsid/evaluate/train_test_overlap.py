@@ -1,6 +1,6 @@
 """Test photographs that a rival has seen in its training, under other names, encoded anew, or resized.
 
-    p = 16 x 16 means of a picture, less their mean, in units of their deviation;      known: rms(p - q) < 0.2
+    p = 16 x 16 means of a picture, less their mean, in units of their deviation;    a copy: rms(p - q) < 0.2
 
 Copies of 400 photographs (half to twice the size, JPEG of quality 60 to 95) are within 0.1, different ones of
 the same collection beyond 0.3. Crops and mirrored copies are not found.
@@ -25,9 +25,9 @@ _FLAT = 1 / 255
 """Deviation below which a picture has nothing to know it by."""
 
 
-def known_note(tests: Mapping[str, Sequence[Path]], training: Sequence[Path], threads: int) -> str:
+def overlap_note(tests: Mapping[str, Sequence[Path]], training: Sequence[Path], threads: int) -> str:
     """In words, which photographs of named test sets the rival is trained on; "" where none is found."""
-    seen = dict(known_pictures([path for photos in tests.values() for path in photos], training, threads))
+    seen = dict(copies_in_training([path for photos in tests.values() for path in photos], training, threads))
     said = []
     for name, photos in tests.items():
         if known := [path for path in photos if path in seen]:
@@ -39,7 +39,9 @@ def known_note(tests: Mapping[str, Sequence[Path]], training: Sequence[Path], th
     return "; ".join(said)
 
 
-def known_pictures(tests: Sequence[Path], training: Sequence[Path], threads: int) -> list[tuple[Path, Path]]:
+def copies_in_training(
+    tests: Sequence[Path], training: Sequence[Path], threads: int
+) -> list[tuple[Path, Path]]:
     """Which of `tests` show what one of `training` shows, and which; files that are no photographs do not."""
     with ThreadPoolExecutor(threads) as pool:
         theirs = np.array(list(pool.map(_looks, training)), np.float32)

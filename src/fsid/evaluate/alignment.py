@@ -1,4 +1,4 @@
-"""How the frames of a burst lie on its first one, and what keeps them out of its truth.
+"""Alignment of the frames of a burst with its first one, and what keeps them out of its truth.
 
 A frame that moved by a whole number of CFA tiles can be put back. A shift that the noise of two frames
 explains is none: on smooth scenes the estimate wanders by tiles, and the less a shift shows the less it does
@@ -56,7 +56,7 @@ Window = tuple[slice, slice]
 
 
 @dataclass(frozen=True)
-class Placed:
+class Alignment:
     """Where a frame goes: roll by (rows, columns) pixels, subtract the offset, then divide by the gain.
 
     offset: normalised. error2: squared standard error of both, normalised, on the mean over the image.
@@ -87,24 +87,24 @@ def read_first(path: Path) -> Raw:
     return first
 
 
-def too_few(reference: Path, placed: Sequence[Placed]) -> FsidError:
+def too_few(reference: Path, frames: Sequence[Alignment]) -> FsidError:
     """What keeps so many frames of a burst out of its truth."""
-    left_out = [p for p in placed if p.fault]
+    left_out = [p for p in frames if p.fault]
     faults = Counter(p.fault for p in left_out)
     if len(left_out) >= LEAST_FRAMES and _are_alike(left_out):
         return FsidError(
-            f"{reference}: {len(left_out)} of the {len(placed)} other frames of its burst "
+            f"{reference}: {len(left_out)} of the {len(frames)} other frames of its burst "
             f"{faults.most_common()[0][0]}, and are alike; remove this first frame"
         )
     reasons = "".join(f"; {number} {fault}" for fault, number in faults.most_common())
     advice = "".join(f". {_ADVICE[fault]}" for fault, _ in faults.most_common())
     return FsidError(
-        f"{reference.parent}: only {len(placed) - len(left_out)} of {len(placed)} frames lie still and have "
+        f"{reference.parent}: only {len(frames) - len(left_out)} of {len(frames)} frames lie still and have "
         f"steady light, at least {LEAST_FRAMES} are needed{reasons}{advice}"
     )
 
 
-def _are_alike(frames: Sequence[Placed]) -> bool:
+def _are_alike(frames: Sequence[Alignment]) -> bool:
     """Whether nearly all of these lie on each other in the same light."""
     light = np.array([p.gain for p in frames]) / np.median([p.gain for p in frames])
     place = np.array([np.add(np.divide(p.roll, 2), p.rest) for p in frames])
@@ -112,7 +112,7 @@ def _are_alike(frames: Sequence[Placed]) -> bool:
     return bool(np.mean(still & (np.abs(light - 1) <= MAX_FLICKER)) >= _NEARLY_ALL)
 
 
-def place(path: Path, first: Raw) -> Placed:
+def align(path: Path, first: Raw) -> Alignment:
     """How a frame lies on the first, which has light, and whether it moved or flickered too much."""
     raw = read_raw(path)
     _check_alike(path, raw, first)
@@ -122,7 +122,7 @@ def place(path: Path, first: Raw) -> Placed:
     gain, offset, error2 = _light(whole, ours, theirs, first.white_level - first.black_level)
     most = min(MAX_SHIFT_TILES, MAX_SHIFT_SHARE * min(ours.shape))
     fault = _MOVED if np.abs(rest).max() > MAX_SUBPIXEL or np.abs(whole).max() > most else ""
-    return Placed(
+    return Alignment(
         path,
         roll=(2 * int(whole[0]), 2 * int(whole[1])),
         gain=gain,

@@ -1,4 +1,4 @@
-"""The light of pixels whose noise the camera cuts off: at DN 0, and counted down from it at the white level.
+"""The light of pixels whose noise the camera clips: at DN 0, and counted down from it at the white level.
 
     m = E max(y, 0) = tau (u Phi(u) + phi(u)),      v = Var max(y, 0),      y ~ N(u tau, tau^2)
 
@@ -24,9 +24,7 @@ _RATIO = (_U * _MEAN + _SHARE) / _MEAN**2 - 1  # of the variance to the squared 
 _PASSES = 3
 
 
-def before_cut_off(
-    dn: np.ndarray, near_dn: np.ndarray, near_dn2: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def unclipped(dn: np.ndarray, near_dn: np.ndarray, near_dn2: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(mu of every pixel in DN, d mu / d mean) from its mean over frames `dn`, all (H, W), counted up from
     DN 0, or down from white.
 

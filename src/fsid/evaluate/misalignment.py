@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fsid.evaluate.placing import unbanded
+from fsid.evaluate.alignment import unbanded
 from fsid.sensor.mosaic import TILE
 
 _PIXELS = 200_000
@@ -56,21 +56,25 @@ class Departure:
         return Departure(self.pixels - other.pixels, self.rows - other.rows, self.columns - other.columns)
 
 
-def beside2(first: Departure, others: Sequence[Departure], gains: Sequence[float], spread: float) -> float:
-    """Mean square by which the first frame lies beside the mean of the F >= 3 others, but for noise.
+def misalignment2(
+    first: Departure, others: Sequence[Departure], gains: Sequence[float], spread: float
+) -> float:
+    """Mean square by which the first frame lies beside the mean of the F >= 3 others, without noise.
 
     gains: what the others were divided by. spread: mean square of the noise variance of the pixels, over the
     square of its mean: 1 where all have the same.
     """
     light = np.log(gains)
     return (
-        _beside2(first.pixels, [other.pixels for other in others], light, spread)
-        + _beside2(first.rows, [other.rows for other in others], light, _SITES)
-        + _beside2(first.columns, [other.columns for other in others], light, _SITES)
+        _misalignment2(first.pixels, [other.pixels for other in others], light, spread)
+        + _misalignment2(first.rows, [other.rows for other in others], light, _SITES)
+        + _misalignment2(first.columns, [other.columns for other in others], light, _SITES)
     )
 
 
-def _beside2(first: np.ndarray, others: Sequence[np.ndarray], light: np.ndarray, spread: float) -> float:
+def _misalignment2(
+    first: np.ndarray, others: Sequence[np.ndarray], light: np.ndarray, spread: float
+) -> float:
     count = len(others)
     share = (count + 1) / count  # of noise, and of what first and mean differ by: the mean has some, too
     frames = np.stack([first / np.float32(np.sqrt(share)), *others])
