@@ -2,7 +2,7 @@
 
 Trains one tiny NAFNet per seed and way (stabilise, k-sigma, noise-map; `fsid.denoise.conditioning`) on the
 clean mosaics of DATA, all with the same patches, noise, loss and schedule, and prints the RAW PSNR per ISO on
-six photographs (`fsid.denoise.quality`). Run it again with the same OUT to go on where it was stopped. The
+six photographs (`fsid.denoise.probes`). Run it again with the same OUT to go on where it was stopped. The
 defaults, 1,500 steps and two seeds, take about 15 minutes of one core.
 """
 
@@ -18,7 +18,7 @@ from rich.table import Table
 
 from fsid.denoise import NetworkConfig, TrainConfig, load_denoiser, train
 from fsid.denoise.conditioning import Conditioning
-from fsid.denoise.quality import CALIBRATED, ISOS, MEASURED, mean_psnr, probes
+from fsid.denoise.probes import CALIBRATED, ISOS, MEASURED, mean_psnr, probes
 
 WAYS: tuple[Conditioning, ...] = ("stabilise", "k-sigma", "noise-map")
 NETWORK = NetworkConfig(width=16, encoder_blocks=(1, 1), middle_blocks=1, decoder_blocks=(1, 1))

@@ -31,13 +31,13 @@ def test_a_notebook_without_widgets_has_lines(monkeypatch: pytest.MonkeyPatch, c
     """rich would show nothing there but a warning to install ipywidgets."""
     pytest.importorskip("torch")
     from fsid.denoise import TrainConfig
-    from fsid.denoise.live import LiveLine
+    from fsid.denoise.progress_line import ProgressLine
 
     monkeypatch.setattr("rich.console._is_jupyter", lambda: True)
     monkeypatch.setattr("fsid.terminal.find_spec", lambda name: None)
-    with LiveLine(TrainConfig(steps=9), 0, 1, quiet=False) as live:
-        live._pace._told -= 100
-        live.update(1, 0.5, 30.0)
+    with ProgressLine(TrainConfig(steps=9), 0, 1, quiet=False) as line:
+        line._pace._told -= 100
+        line.update(1, 0.5, 30.0)
     assert "train: 1/9  loss 0.500" in capsys.readouterr().err
 
 

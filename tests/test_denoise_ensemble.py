@@ -13,7 +13,7 @@ torch = pytest.importorskip("torch")
 import fsid  # noqa: E402
 from fsid.cli.main import main  # noqa: E402
 from fsid.denoise import denoise_raw, load_model  # noqa: E402
-from fsid.denoise.quality import mean_psnr, probes  # noqa: E402
+from fsid.denoise.probes import mean_psnr, probes  # noqa: E402
 from fsid.errors import FsidError  # noqa: E402
 from fsid.evaluate import read_testset  # noqa: E402
 from fsid.evaluate.models import evaluate_models  # noqa: E402

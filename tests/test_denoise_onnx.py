@@ -24,7 +24,7 @@ from fsid.denoise.model import load_denoiser  # noqa: E402
 from fsid.denoise.onnx_denoiser import OnnxDenoiser, load_onnx, onnx_denoiser  # noqa: E402
 from fsid.denoise.onnx_export import onnx_bytes, onnx_model  # noqa: E402
 from fsid.denoise.onnx_int8 import eight_bit  # noqa: E402
-from fsid.denoise.quality import CALIBRATED, mean_psnr, probes  # noqa: E402
+from fsid.denoise.probes import CALIBRATED, mean_psnr, probes  # noqa: E402
 from fsid.errors import FsidError  # noqa: E402
 from fsid.sensor import NoiseLevel, Raw, load_profile, read_raw, write_dng  # noqa: E402
 

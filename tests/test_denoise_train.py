@@ -36,16 +36,16 @@ from fsid.denoise import (  # noqa: E402
     NetworkConfig,
     TrainConfig,
     denoise_raw,
-    live,
     load_denoiser,
     load_history,
+    progress_line,
     train,
 )
-from fsid.denoise.board import Board  # noqa: E402
 from fsid.denoise.checkpoint import TrainState, load_checkpoint  # noqa: E402
 from fsid.denoise.denoise import variance_at_grey  # noqa: E402
 from fsid.denoise.raw_denoiser import RawDenoiser  # noqa: E402
 from fsid.denoise.stabilise import stabilise, unstabilise  # noqa: E402
+from fsid.denoise.tensorboard_log import TensorBoardLog  # noqa: E402
 from fsid.denoise.train import _prepare, _step, learning_rate, mean_psnr, noise_left  # noqa: E402
 from fsid.denoise.validate import Validation, _captures, held_out, validation  # noqa: E402
 from fsid.errors import FsidError  # noqa: E402
@@ -362,7 +362,7 @@ def test_photographs_are_watched_and_do_not_choose(data: Path, photos: Path, tmp
     assert model.exists()
 
 
-def test_progress_replaces_the_live_line_and_quiet_is_silent(
+def test_progress_replaces_the_progress_line_and_quiet_is_silent(
     data: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     calls: list[tuple[int, int]] = []
@@ -383,8 +383,8 @@ def test_a_training_says_its_step_in_a_terminal_of_eighty_columns(
 ) -> None:
     monkeypatch.setenv("COLUMNS", "80")
     times = iter((0.0, *(100.0,) * 9))
-    monkeypatch.setattr(live, "Pace", lambda: Pace(lambda: next(times)))
-    with live.LiveLine(replace(CONFIG, steps=100_000), 0, 1, quiet=False) as line:
+    monkeypatch.setattr(progress_line, "Pace", lambda: Pace(lambda: next(times)))
+    with progress_line.ProgressLine(replace(CONFIG, steps=100_000), 0, 1, quiet=False) as line:
         line.validated(48.18)
         line.update(12_345, 0.233, 48.96)
     shown = capsys.readouterr().err
@@ -494,7 +494,7 @@ def test_a_folder_that_cannot_be_written_is_one_line_before_the_work(
 def test_a_run_that_goes_on_keeps_the_figures_up_to_its_checkpoint_in_tensorboard(tmp_path: Path) -> None:
     accumulator = pytest.importorskip("tensorboard.backend.event_processing.event_accumulator")
     for first, steps in ((0, (2,)), (0, (2, 4, 6)), (4, (6,))):  # killed before a checkpoint, and after one
-        board = Board(tmp_path, first, wanted=True)
+        board = TensorBoardLog(tmp_path, first, wanted=True)
         for step in steps:
             board.write(step, {"train/loss": float(first + step)})
         board.close()
@@ -510,13 +510,13 @@ def test_logs_that_cannot_be_written_are_one_line(tmp_path: Path, monkeypatch: p
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     line = r"tensorboard: cannot be written .*tensorboard=false does without"
-    board = Board(tmp_path / "full", 0, wanted=True)
+    board = TensorBoardLog(tmp_path / "full", 0, wanted=True)
     monkeypatch.setattr("torch.utils.tensorboard.SummaryWriter.add_scalar", full)
     with pytest.raises(FsidError, match=line):
         board.write(1, {"train/loss": 1.0})
     (tmp_path / "tensorboard").touch()
     with pytest.raises(FsidError, match=line):
-        Board(tmp_path, 0, wanted=True)
+        TensorBoardLog(tmp_path, 0, wanted=True)
 
 
 def test_the_corrected_command_goes_into_the_folder_of_the_one_that_failed(

@@ -21,7 +21,8 @@ from fsid.denoise.interface import denoise as _denoise
 from fsid.denoise.interface import load_model
 from fsid.denoise.model import Denoiser, ModelCard, load_denoiser, save_model
 from fsid.denoise.raw_denoiser import NetworkConfig, RawDenoiser
-from fsid.denoise.train import load_history, train
+from fsid.denoise.run_output import load_history
+from fsid.denoise.train import train
 from fsid.denoise.train_config import TrainConfig, train_config
 
 __all__ = [

@@ -9,7 +9,7 @@ That also keeps them what the network was trained on: means over a patch, not ov
 a convolutional network; tiles that overlap by its receptive radius and start on multiples of its stride
 repeat the untiled result.
 
-Noise that the camera cut off is drawn anew after a first pass (`cut_off`).
+Noise that the camera cut off is drawn anew after a first pass (`clipped_noise`).
 
 The network knows one geometry, an RGGB tile seen from R. Other patterns are brought to it by mirroring one
 row or column outwards (index -1 is index 1, which has the same colour), and the extra pixels are cut off
@@ -24,7 +24,7 @@ from typing import Protocol
 
 import numpy as np
 
-from fsid.denoise.cut_off import drawn_anew, lowest_levels
+from fsid.denoise.clipped_noise import drawn_anew, lowest_levels
 from fsid.denoise.ensemble import check_ensemble, self_ensemble
 from fsid.denoise.model import ModelCard
 from fsid.errors import FsidError, check_kind, whole

@@ -18,7 +18,7 @@ from fsid.denoise.model import Denoiser, load_denoiser, model_path, save_model
 from fsid.denoise.onnx_denoiser import onnx_denoiser
 from fsid.denoise.onnx_export import onnx_model
 from fsid.denoise.onnx_int8 import eight_bit
-from fsid.denoise.quality import Probe, mean_psnr, probes
+from fsid.denoise.probes import Probe, mean_psnr, probes
 from fsid.denoise.sessions import read_sessions
 from fsid.errors import FsidError
 from fsid.files import check_output, write_atomically

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from fsid.denoise.onnx_denoiser import inputs
-from fsid.denoise.quality import CALIBRATED, CALIBRATED_ISOS, probes
+from fsid.denoise.probes import CALIBRATED, CALIBRATED_ISOS, probes
 from fsid.sensor import pack
 
 _CALIBRATION_TILE = 128

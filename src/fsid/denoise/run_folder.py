@@ -8,7 +8,7 @@ from pathlib import Path
 
 from fsid.config import load_settings, read_yaml, save_settings, to_plain
 from fsid.dataset.index import StoredMosaic, identity
-from fsid.denoise.initial import drop_initial, has_network, keep_initial
+from fsid.denoise.initial_weights import drop_initial, has_network, keep_initial
 from fsid.denoise.model import Denoiser
 from fsid.denoise.sessions import SESSIONS_FILE, read_sessions
 from fsid.denoise.train_config import TrainConfig

@@ -12,10 +12,10 @@ from typing import Any
 
 from fsid.errors import FsidError
 
-BOARD_FOLDER = "tensorboard"
+LOG_FOLDER = "tensorboard"
 
 
-class Board:
+class TensorBoardLog:
     """Writes scalars into RUN/tensorboard, or nothing where `wanted` is False or there is no tensorboard.
 
     step: of the checkpoint that the run goes on from, whose own figures stay; 0 where it starts. FsidError
@@ -24,7 +24,7 @@ class Board:
 
     def __init__(self, run_dir: Path, step: int, *, wanted: bool) -> None:
         self._writer: Any = None
-        self._folder = run_dir / BOARD_FOLDER
+        self._folder = run_dir / LOG_FOLDER
         if wanted:
             try:
                 from torch.utils.tensorboard import SummaryWriter

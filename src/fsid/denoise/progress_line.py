@@ -18,7 +18,7 @@ _SMOOTHING = 0.05  # of the shown loss and PSNR, which jump from batch to batch
 _WIDE = 100  # columns of a terminal that has room for a bar and the loss
 
 
-class LiveLine:
+class ProgressLine:
     """Context manager; nothing is shown where `quiet`."""
 
     def __init__(self, config: TrainConfig, step: int, processes: int, *, quiet: bool) -> None:
@@ -41,7 +41,7 @@ class LiveLine:
         self._batch = config.batch * processes
         self._shown: tuple[float, float] | None = None
 
-    def __enter__(self) -> LiveLine:
+    def __enter__(self) -> ProgressLine:
         self._progress.start()
         return self
 
