@@ -163,7 +163,7 @@ def test_a_broken_file_is_one_line_that_names_it(tmp_path: Path, text: str, word
 
 def test_values_are_counted_while_they_are_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """Each takes a kilobyte: a file of 64 MiB may hold 30 million."""
-    monkeypatch.setattr("fsid.config._MOST_NODES", 100)
+    monkeypatch.setattr("fsid.yaml_json._MOST_NODES", 100)
     file = tmp_path / "long.yaml"
     file.write_text("inner: {names: [" + "x, " * 101 + "]}\n{")  # what is broken comes after them
     with pytest.raises(FsidError, match=r"long\.yaml: is not valid YAML \(it has more than 100 values\)"):

@@ -19,7 +19,6 @@ from fsid.assets.survey import KNOWN
 from fsid.cli.libraries import read_libraries
 from fsid.cli.main import main
 from fsid.cli.progress import progress_bar
-from fsid.config import read_yaml
 from fsid.dataset import Workforce, contact_sheet, generate_config, make_only, shard_path, write_shard
 from fsid.dataset.index import index_mosaics
 from fsid.dataset.png import to_uint8
@@ -28,6 +27,7 @@ from fsid.dataset.shards import read_samples
 from fsid.errors import FsidError
 from fsid.scene import SceneConfig
 from fsid.sensor import develop
+from fsid.yaml_json import read_yaml
 
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 REPOSITORY = Path(__file__).resolve().parents[1]

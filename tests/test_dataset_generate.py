@@ -24,7 +24,7 @@ from PIL import Image
 
 from fsid.assets.survey import KNOWN
 from fsid.cli.main import main
-from fsid.config import load_settings, read_yaml
+from fsid.config import load_settings
 from fsid.dataset import (
     GenerateConfig,
     attempt,
@@ -50,6 +50,7 @@ from fsid.dataset.worker import Worker
 from fsid.errors import FsidError
 from fsid.sensor import NoiseTerms, load_profile, read_raw, save_profile
 from fsid.sensor.light import LONGEST_EXPOSURE_S
+from fsid.yaml_json import read_yaml
 
 SMALL = ["width=128", "height=96"]
 

@@ -14,13 +14,14 @@ import pytest
 import rawpy
 from PIL import Image
 
-from fsid.config import from_plain, load_settings, read_yaml
+from fsid.config import from_plain, load_settings
 from fsid.dataset import DatasetConfig, GenerateConfig, generate, shard_path, write_shard
 from fsid.dataset.card import _listed, _sources, _Tally
 from fsid.dataset.inspect import inspect
 from fsid.dataset.shards import read_records, read_samples
 from fsid.dataset.statistics import TITLES
 from fsid.errors import FsidError
+from fsid.yaml_json import read_yaml
 
 SETTINGS = ["width=64", "height=48", "texture_size=64", "supersampling=1", "scene.objects=[1,3]"]
 
@@ -89,8 +90,9 @@ def test_a_card_is_written_when_all_is_there_and_only_then(data: Path) -> None:
     config = load_settings(GenerateConfig, None, ())
     with pytest.raises(FsidError, match="already holds another dataset"):
         generate(data, config, count=6, seed=2, shard_size=4)
-    from fsid.config import from_plain, read_yaml
+    from fsid.config import from_plain
     from fsid.dataset import DatasetConfig
+    from fsid.yaml_json import read_yaml
 
     same = from_plain(DatasetConfig, read_yaml(data / "config.yaml"), source="config.yaml").generate
     generate(data, same, count=6, seed=2, shard_size=4, command="fsid generate data --count 6")

@@ -19,7 +19,7 @@ from skimage import data
 
 from fsid.cli.main import main
 from fsid.cli.progress import progress_bar
-from fsid.config import read_yaml, save_settings
+from fsid.config import save_settings
 from fsid.errors import FsidError
 from fsid.evaluate.compare import NOISY, ImageRow, Method, summarise, write_images
 from fsid.evaluate.dead_leaves import RADIUS_PX, dead_leaves_rand, write_dead_leaves
@@ -33,6 +33,7 @@ from fsid.evaluate.simulated import LUXES
 from fsid.evaluate.testset import TestImage, TestSet, levels_of
 from fsid.evaluate.train_test_overlap import copies_in_training
 from fsid.sensor import load_profile, save_profile
+from fsid.yaml_json import read_yaml
 
 SMOKE = ("--scale", "smoke", "--count", "2", "--steps", "3", "--quiet")
 

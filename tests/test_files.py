@@ -10,7 +10,6 @@ from typing import NoReturn
 import numpy as np
 import pytest
 
-from fsid.config import read_json, read_yaml
 from fsid.dataset import grid, save_png, shard_keys, to_uint8
 from fsid.dataset.photos import read_photo
 from fsid.dataset.pictures import read_exr
@@ -19,6 +18,7 @@ from fsid.errors import FsidError
 from fsid.evaluate.testset import TESTSET_FILE, read_testset
 from fsid.files import check_folder, make_folder, write_atomically, write_together
 from fsid.sensor import load_profile
+from fsid.yaml_json import read_json, read_yaml
 
 
 def test_a_file_is_replaced_whole(tmp_path: Path) -> None:

@@ -16,8 +16,8 @@ from fsid.cli.arguments import overrides
 from fsid.cli.iso_notes import note_extrapolation
 from fsid.cli.libraries import read_libraries
 from fsid.cli.progress import progress_bar
-from fsid.counted import counted
 from fsid.errors import FsidError
+from fsid.plurals import counted
 from fsid.terminal import Terminal
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from tyro.conf import Positional
 
 from fsid.cli.progress import progress_bar
 from fsid.cli.tables import print_table
-from fsid.counted import counted
+from fsid.plurals import counted
 from fsid.terminal import Terminal
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from fsid.cli.progress import progress_bar
-from fsid.counted import counted
+from fsid.plurals import counted
 from fsid.terminal import Terminal
 
 if TYPE_CHECKING:

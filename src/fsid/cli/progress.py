@@ -12,8 +12,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColum
 from rich.table import Column
 from rich.text import Text
 
-from fsid.counted import counted
 from fsid.pace import Pace
+from fsid.plurals import counted
 from fsid.terminal import Terminal
 
 

@@ -22,7 +22,6 @@ from PIL import Image
 from fsid import __version__
 from fsid.assets.file_names import PREFIX
 from fsid.assets.sources import split_source, survey_meshes
-from fsid.counted import counted
 from fsid.dataset.config import DATASET_FILE, DatasetConfig
 from fsid.dataset.contact_sheet import grid
 from fsid.dataset.index import some_mosaics
@@ -30,6 +29,7 @@ from fsid.dataset.png import stored_preview
 from fsid.dataset.shards import read_records, records_of, shard_keys
 from fsid.errors import FsidError
 from fsid.files import check_file, write_atomically
+from fsid.plurals import counted
 
 CARD, SHEET = "README.md", "samples.png"
 _TITLE = "# RAW pairs made by FSID"

@@ -11,9 +11,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from fsid.config import Override, check_fields, from_plain, load_named, load_settings, read_yaml
+from fsid.config import Override, check_fields, from_plain, load_named, load_settings
 from fsid.errors import FsidError
 from fsid.scene import VARIANTS, SceneConfig
+from fsid.yaml_json import read_yaml
 
 DATASET_FILE = "config.yaml"
 """In the folder of a dataset: its `DatasetConfig`."""

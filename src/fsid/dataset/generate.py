@@ -16,7 +16,7 @@ from functools import partial
 from pathlib import Path
 
 from fsid.assets.survey import KNOWN
-from fsid.config import check_fields, from_plain, read_yaml, save_settings, to_plain
+from fsid.config import check_fields, from_plain, save_settings, to_plain
 from fsid.dataset.card import CARD, check_card, write_card
 from fsid.dataset.config import DATASET_FILE, RENDERED, DatasetConfig, GenerateConfig
 from fsid.dataset.crew import Crew, LocalCrew, run
@@ -38,6 +38,7 @@ from fsid.errors import FsidError, check_kind, whole
 from fsid.files import held, stamp
 from fsid.sensor import CameraProfile, load_bayer_profile
 from fsid.sensor.profiles import profiles_digest
+from fsid.yaml_json import read_yaml
 
 SHARD_SIZE = 16
 SAMPLES_PER_WORKER = 320

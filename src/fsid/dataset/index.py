@@ -20,18 +20,19 @@ from typing import Any, Literal
 import numpy as np
 import tifffile
 
-from fsid.config import from_plain, read_yaml
+from fsid.config import from_plain
 from fsid.dataset.attempt import SAMPLE_KEY
 from fsid.dataset.config import DATASET_FILE, DatasetConfig, split_of
 from fsid.dataset.shards import find_shards, open_shard, read_heads
 from fsid.errors import FsidError
+from fsid.evenly_spaced import spaced
 from fsid.files import read_whole, stamp
 from fsid.sensor import dng_tags
 from fsid.sensor.mosaic import check_cfa
 from fsid.sensor.quantise import check_levels
 from fsid.sensor.raw import NoiseLevel
 from fsid.sensor.tiff import quotients
-from fsid.spaced import spaced
+from fsid.yaml_json import read_yaml
 
 _ORIGIN_KEYS = ("crops", "exposures", "noise_levels", "validation_every")
 """Settings that say which scene a sample is from; others may be those of another version of FSID."""

@@ -24,9 +24,9 @@ from fsid.dataset.photos import find_photos, read_photo
 from fsid.dataset.shards import read_member, read_record
 from fsid.dataset.statistics import Comparison, compare, measure, pool
 from fsid.errors import FsidError
+from fsid.evenly_spaced import spaced
 from fsid.sensor import camera_to_srgb_matrix, clean_from_photo, load_profile, pack, srgb_encode
 from fsid.sensor.colour import is_of_camera
-from fsid.spaced import spaced
 
 MAX_PICTURES = 400
 """Of a larger set, this many pictures are measured, evenly spaced."""

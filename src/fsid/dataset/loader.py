@@ -41,11 +41,11 @@ from torch import Tensor
 from torch.utils.data import Dataset
 
 from fsid.config import check_fields
-from fsid.counted import counted
 from fsid.dataset.index import StoredMosaic, index_mosaics
 from fsid.dataset.noise_levels import LevelTable
 from fsid.dataset.patch_grid import Cell, Grid, check_shrink, shrink_for
 from fsid.errors import FsidError
+from fsid.plurals import counted
 from fsid.sensor.formula import stored, with_noise
 from fsid.sensor.gaussian import standard_normal
 from fsid.sensor.mosaic import halved, site_offsets

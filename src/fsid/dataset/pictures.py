@@ -17,7 +17,6 @@ from pathlib import Path
 import numpy as np
 
 from fsid.assets.exr import stated_size, stated_values
-from fsid.counted import counted
 from fsid.dataset.photos import (
     PHOTO_SUFFIXES,
     SMALLEST_PX,
@@ -28,6 +27,7 @@ from fsid.dataset.photos import (
 )
 from fsid.errors import FsidError, refuse_any
 from fsid.files import check_file
+from fsid.plurals import counted
 
 EXR_SUFFIX = ".exr"
 _SRGB_CHROMATICITIES = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)

@@ -23,9 +23,9 @@ import numpy as np
 
 import fsid
 from fsid.assets.bake_cache import content_key
-from fsid.counted import counted
 from fsid.dataset.crew import Lost, MakeWork, Ready, do_task, thread_limits
 from fsid.errors import FsidError
+from fsid.plurals import counted
 
 _PATIENCE_S = 5.0
 _DECIDING = {".py", ".glsl", ".frag", ".vert", ".yaml", ".npy"}

@@ -20,9 +20,9 @@ from itertools import groupby, starmap
 from pathlib import Path
 from typing import Any
 
-from fsid.config import parse_json
 from fsid.errors import FsidError
 from fsid.files import check_file, open_new
+from fsid.yaml_json import parse_json
 
 _PART = re.compile(r"\.shard-\d+\.tar\..+-\d+\.part|(config\.yaml|README\.md|samples\.png)(\.\d+)?\.part")
 """Names that writers give (`part_path`, `fsid.files.write_together`) and people hardly do."""

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from fsid.config import from_plain, read_yaml
+from fsid.config import from_plain
 from fsid.dataset.attempt import SAMPLE_KEY, Sample, sample_key
 from fsid.dataset.config import DATASET_FILE, DatasetConfig, GenerateConfig
 from fsid.dataset.generate import dataset_config
@@ -16,6 +16,7 @@ from fsid.dataset.shards import read_record, read_records, shard_path
 from fsid.dataset.worker import rendering
 from fsid.errors import FsidError
 from fsid.files import make_folder, read_whole, write_atomically
+from fsid.yaml_json import read_yaml
 
 
 def make_only(

@@ -12,7 +12,6 @@ from typing import Literal
 import numpy as np
 import torch
 
-from fsid.config import read_json
 from fsid.denoise.denoise import Network, denoise_raw
 from fsid.denoise.model import Denoiser, load_denoiser, model_path, save_model
 from fsid.denoise.onnx_denoiser import onnx_denoiser
@@ -23,6 +22,7 @@ from fsid.denoise.sessions import read_sessions
 from fsid.errors import FsidError
 from fsid.files import check_output, write_atomically
 from fsid.sensor import NoiseLevel
+from fsid.yaml_json import read_json
 
 Precision = Literal["float32", "float16", "int8"]
 TOLERANCE = 1e-4  # between onnxruntime and PyTorch, of the normalised clean image

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from fsid.config import load_settings, read_yaml, save_settings, to_plain
+from fsid.config import load_settings, save_settings, to_plain
 from fsid.dataset.index import StoredMosaic, identity
 from fsid.denoise.initial_weights import drop_initial, has_network, keep_initial
 from fsid.denoise.model import Denoiser
@@ -15,6 +15,7 @@ from fsid.denoise.train_config import TrainConfig
 from fsid.errors import FsidError
 from fsid.files import make_folder
 from fsid.sensor.profiles import profiles_digest
+from fsid.yaml_json import read_yaml
 
 CONFIG_FILE = "config.yaml"
 _WITHOUT_EFFECT = {"checkpoint_every", "loader_processes", "tensorboard"}

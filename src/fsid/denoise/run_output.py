@@ -11,8 +11,7 @@ import numpy as np
 import torch
 from accelerate import Accelerator
 
-from fsid.config import read_json, read_yaml, to_plain
-from fsid.counted import counted
+from fsid.config import to_plain
 from fsid.dataset.config import DATASET_FILE
 from fsid.dataset.index import StoredMosaic, identity, index_mosaics
 from fsid.denoise.checkpoint import TrainState, save_checkpoint
@@ -25,7 +24,9 @@ from fsid.denoise.train_config import TrainConfig
 from fsid.denoise.validate import validation
 from fsid.errors import FsidError
 from fsid.files import write_atomically
+from fsid.plurals import counted
 from fsid.sensor.profiles import load_bayer_profile, profiles_digest
+from fsid.yaml_json import read_json, read_yaml
 
 HISTORY_FILE, VALIDATION_FILE = "history.json", "validation.json"
 LAST_FILE = "last.safetensors"  # beside the best network, `MODEL_FILE`

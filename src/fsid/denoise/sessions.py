@@ -23,9 +23,9 @@ from typing import Any
 
 import torch
 
-from fsid.config import read_json
 from fsid.errors import FsidError
 from fsid.files import write_atomically
+from fsid.yaml_json import read_json
 
 SESSIONS_FILE = "sessions.json"
 

@@ -16,12 +16,12 @@ from collections.abc import Sequence
 from dataclasses import asdict, fields, replace
 from pathlib import Path
 
-from fsid.counted import counted
 from fsid.errors import FsidError
 from fsid.evaluate.alignment import LEAST_FRAMES, align, read_first
 from fsid.evaluate.burst_truth import TruthQuality, average, cut
 from fsid.evaluate.testset import Progress, TestImage, TestSet, staged, write_testset
 from fsid.files import write_atomically
+from fsid.plurals import counted
 from fsid.sensor import (
     NoiseLevel,
     Raw,

@@ -16,14 +16,14 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 from scipy.special import stdtrit
 
-from fsid.counted import counted
 from fsid.errors import FsidError
 from fsid.evaluate.classical import denoise_classical
 from fsid.evaluate.metrics import psnr, ssim
 from fsid.evaluate.testset import ALL_SETS, TestImage, TestSet, listed, read_testset
+from fsid.evenly_spaced import spaced
 from fsid.files import write_atomically
+from fsid.plurals import counted
 from fsid.sensor import Raw, develop, read_raw, upright
-from fsid.spaced import spaced
 
 MOST_DB = 100.0
 """What a PSNR counts as at most: an rms error of 1e-5 of white is less than a step of a 16-bit file. A result

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from fsid.counted import counted
 from fsid.dataset.inspect_plot import as_label
 from fsid.evaluate.compare import Comparison, Crops, Row, confidence, perfect_note
 from fsid.evaluate.report import (
@@ -22,6 +21,7 @@ from fsid.evaluate.report import (
     plot,
 )
 from fsid.evaluate.testset import ALL_SETS
+from fsid.plurals import counted
 
 ERROR_GAIN = 8.0
 """Error maps show |output - truth| of the developed pictures this many times."""

@@ -20,7 +20,6 @@ from itertools import product
 from pathlib import Path
 
 from fsid.config import Override, given_keys, load_settings
-from fsid.counted import counted
 from fsid.dataset import (
     GenerateConfig,
     check_given,
@@ -61,6 +60,7 @@ from fsid.evaluate.simulated import LUXES, simulated_testset
 from fsid.evaluate.testset import TESTSET_FILE, levels_of, photo_testset, read_testset
 from fsid.evaluate.train_test_overlap import overlap_note
 from fsid.files import make_folder, read_whole
+from fsid.plurals import counted
 from fsid.scene import VARIANTS
 from fsid.sensor import load_bayer_profile
 from fsid.sensor.profiles import profiles_digest

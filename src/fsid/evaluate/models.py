@@ -8,7 +8,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fsid.counted import counted
 from fsid.errors import FsidError
 from fsid.evaluate.compare import (
     CLASSICAL,
@@ -22,6 +21,7 @@ from fsid.evaluate.compare import (
 )
 from fsid.evaluate.testset import TestSet, read_testset
 from fsid.files import make_folder, paths_of
+from fsid.plurals import counted
 from fsid.sensor import read_raw
 
 if TYPE_CHECKING:

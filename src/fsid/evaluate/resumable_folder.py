@@ -7,9 +7,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from fsid.config import from_plain, read_yaml, save_settings, to_plain
+from fsid.config import from_plain, save_settings, to_plain
 from fsid.errors import FsidError
 from fsid.files import held
+from fsid.yaml_json import read_yaml
 
 
 @contextmanager

@@ -23,7 +23,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from fsid.config import from_plain, read_json, to_plain
+from fsid.config import from_plain, to_plain
 from fsid.dataset import check_pictures, find_photos, read_photo
 from fsid.dataset.pictures import pictures_digest
 from fsid.errors import FsidError
@@ -40,6 +40,7 @@ from fsid.sensor import (
 )
 from fsid.sensor.light import LONGEST_EXPOSURE_S
 from fsid.sensor.profiles import profiles_digest
+from fsid.yaml_json import read_json
 
 Progress = Callable[[int, int], None]
 T = TypeVar("T")

@@ -14,10 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
-from fsid.counted import counted
 from fsid.dataset.photos import thumbnail
 from fsid.errors import FsidError
 from fsid.evaluate.testset import as_text
+from fsid.plurals import counted
 
 _SIDE = 16
 _ALIKE = 0.2

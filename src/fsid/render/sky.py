@@ -19,9 +19,9 @@ import numpy as np
 
 from fsid.assets.file_names import PREFIX
 from fsid.assets.skies import XYZE, exr_size, size_flaw, sky_sources
-from fsid.counted import counted
 from fsid.errors import FsidError, refuse_any
 from fsid.files import read_whole
+from fsid.plurals import counted
 from fsid.scene.colour import LUMINANCE
 from fsid.scene.model import Sky
 

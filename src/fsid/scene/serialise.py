@@ -13,11 +13,12 @@ from types import GenericAlias, NoneType, UnionType
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
 from fsid.assets import BACKGROUND_PARTS
-from fsid.config import parse_json, to_plain
+from fsid.config import to_plain
 from fsid.errors import FsidError
 from fsid.scene.check import check_scene
 from fsid.scene.lens import check_distortion, corner_radius
 from fsid.scene.model import Scene
+from fsid.yaml_json import parse_json
 
 
 def scene_to_json(scene: Scene) -> str:

@@ -17,9 +17,9 @@ from pathlib import Path
 
 import numpy as np
 
-from fsid.counted import counted
 from fsid.errors import FsidError
 from fsid.files import paths_of
+from fsid.plurals import counted
 from fsid.sensor.calibrate import (
     NoiseFit,
     Samples,

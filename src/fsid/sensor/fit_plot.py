@@ -16,12 +16,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fsid.errors import FsidError
+from fsid.evenly_spaced import spaced
 from fsid.files import check_output
 from fsid.sensor.calibrate import LINEAR_SHARE, NoiseFit
 from fsid.sensor.camera_fit import Calibration
 from fsid.sensor.camera_profile import MONO, CameraProfile
 from fsid.sensor.mosaic import SITES
-from fsid.spaced import spaced
 
 COLOURS = ("tab:red", "tab:green", "tab:olive", "tab:blue")
 PICTURES = (".png", ".pdf", ".svg")

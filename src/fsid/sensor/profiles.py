@@ -26,7 +26,7 @@ import numpy as np
 import yaml
 from numpy.polynomial.polynomial import polyval
 
-from fsid.config import parse_yaml, to_plain
+from fsid.config import to_plain
 from fsid.errors import FsidError
 from fsid.files import read_whole, write_atomically
 from fsid.sensor.camera_profile import MONO, CameraProfile, Measurement, Optics
@@ -35,6 +35,7 @@ from fsid.sensor.iso_law import k_law, sigma2_law
 from fsid.sensor.mosaic import check_cfa
 from fsid.sensor.quantise import ROUNDING_DN2
 from fsid.sensor.terms import PAPER, NoiseTerms, parse_terms
+from fsid.yaml_json import parse_yaml
 
 _REQUIRED = {"name", "camera", "cfa", "bits", "black_level", "white_level", "levels"}
 _OPTIONAL = {"source", "notes", "date", "xyz_to_camera", "law", "terms", "optics"}
