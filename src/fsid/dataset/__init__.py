@@ -4,14 +4,8 @@ from fsid.dataset.attempt import Sample, sample_key
 from fsid.dataset.config import RENDERED, DatasetConfig, GenerateConfig, generate_config
 from fsid.dataset.contact_sheet import contact_sheet, grid
 from fsid.dataset.estimate import Estimate, estimate
-from fsid.dataset.generate import (
-    Workforce,
-    check_settings,
-    dataset_config,
-    generate,
-    is_begun,
-    pairs_to_make,
-)
+from fsid.dataset.generate import Workforce, generate, pairs_to_make
+from fsid.dataset.identity import check_settings, dataset_config, is_begun
 from fsid.dataset.photos import find_photos, read_photo
 from fsid.dataset.pictures import check_pictures, find_pictures
 from fsid.dataset.png import check_png, save_png, to_uint8

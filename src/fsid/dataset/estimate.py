@@ -13,7 +13,8 @@ from dataclasses import dataclass
 
 from fsid.dataset.config import GenerateConfig
 from fsid.dataset.crew import run
-from fsid.dataset.generate import Workforce, dataset_config
+from fsid.dataset.generate import Workforce
+from fsid.dataset.identity import dataset_config
 from fsid.dataset.sample import encode, make_frame
 from fsid.dataset.worker import Worker
 

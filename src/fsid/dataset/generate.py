@@ -11,36 +11,24 @@ import itertools
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 from fsid.assets.survey import KNOWN
-from fsid.config import check_fields, from_plain, save_settings, to_plain
+from fsid.config import check_fields, save_settings
 from fsid.dataset.card import CARD, check_card, write_card
-from fsid.dataset.config import DATASET_FILE, RENDERED, DatasetConfig, GenerateConfig
+from fsid.dataset.config import DATASET_FILE, DatasetConfig, GenerateConfig
 from fsid.dataset.crew import Crew, LocalCrew, run
+from fsid.dataset.identity import check_same_pictures, dataset_config, is_begun
 from fsid.dataset.near_duplicates import Looks, Settle, settle
-from fsid.dataset.origins import (
-    as_far_as_known,
-    check_same_origins,
-    check_same_pictures,
-    files_digest,
-    in_places_of,
-    source_folders,
-)
-from fsid.dataset.pictures import find_pictures, pictures_digest
 from fsid.dataset.sample import encode, make_frame
 from fsid.dataset.shards import count_whole, each_sample, remove_parts, shard_path, write_shard
-from fsid.dataset.tasks import SceneRenderer, check_cameras, check_task
+from fsid.dataset.tasks import SceneRenderer
 from fsid.dataset.worker import Worker
-from fsid.errors import FsidError, check_kind, whole
+from fsid.errors import FsidError, whole
 from fsid.files import held, stamp
-from fsid.sensor import CameraProfile, load_bayer_profile
-from fsid.sensor.profiles import profiles_digest
-from fsid.yaml_json import read_yaml
 
-SHARD_SIZE = 16
 SAMPLES_PER_WORKER = 320
 """After so many a worker is replaced, so that whatever a driver leaks stays small."""
 
@@ -129,7 +117,7 @@ def generate(
 
     workers: short for Workforce(workers); each is a process that imports the calling script, so a script
     calls this under `if __name__ == "__main__":`. shard_size: samples, a multiple of
-    `config.pairs_per_frame`; 0 takes the first from SHARD_SIZE on. progress(done, total): samples, called at
+    `config.pairs_per_frame`; 0 takes the first one from 16 on. progress(done, total): samples, called at
     the start and after every shard. lost(line): called for every worker that died; its shard is made again by
     another. finishing(done, total): shards that are read again when all are there, for near-duplicates and
     for the dataset card, README.md. command: for the card.
@@ -182,54 +170,6 @@ def pairs_to_make(out: str | Path, dataset: DatasetConfig, count: int) -> tuple[
     return sum(len(shard.indices) for shard in missing), len(missing)
 
 
-def dataset_config(config: GenerateConfig, seed: int, shard_size: int = 0) -> DatasetConfig:
-    """The identity of the dataset of (config, seed); FsidError where what it names does not exist.
-
-    Surveys the folders of meshes, textures and skies, which takes minutes the first time.
-    """
-    check_settings(config)
-    pairs = config.pairs_per_frame
-    shard_size = shard_size or -(-SHARD_SIZE // pairs) * pairs
-    if shard_size < 1 or shard_size % pairs:
-        raise FsidError(f"shard size {shard_size}: is not a multiple of the {pairs} pairs of a frame")
-    pictures = find_pictures(Path(config.images)) if config.images else []
-    return DatasetConfig(
-        seed,
-        shard_size,
-        config,
-        pictures=len(pictures),
-        pictures_digest=pictures_digest(pictures) if pictures else "",
-        profiles_digest=profiles_digest(config.cameras),
-        files_digest=files_digest(config),
-    )
-
-
-def check_settings(config: GenerateConfig) -> None:
-    """FsidError where what `config` names does not exist, or its parts do not agree; reads no large file."""
-    check_kind(config, GenerateConfig, "generate_config makes one of a file, a name or settings")
-    for camera in config.cameras:
-        _check_noise(load_bayer_profile(camera), config.iso_range[1])
-    check_cameras(config)
-    scene = config.scene
-    for folder in source_folders(scene):
-        if not Path(folder).exists():
-            raise FsidError(f"{folder}: there is no such folder")
-    if config.crops > config.windows and config.checks.duplicate_bits >= 0 and not config.images:
-        raise FsidError(
-            f"crops: {config.crops}, but crop_width and crop_height leave {config.windows} different ones, "
-            "and near-duplicates are refused"
-        )
-    check_task(config, find_pictures(Path(config.images)) if config.images else [])
-
-
-def _check_noise(profile: CameraProfile, highest_iso: float) -> None:
-    """FsidError where noise is more than the white level; up there it would end the run that draws it."""
-    try:
-        profile.level(highest_iso)
-    except FsidError as error:
-        raise FsidError(f"iso_range: {error}") from None
-
-
 @contextmanager
 def _locked(out: Path) -> Iterator[None]:
     """`out` is this process's, and free of what an interrupted one left, if that is sure to be dead."""
@@ -256,45 +196,6 @@ def _check_own(out: Path, dataset: DatasetConfig) -> bool:
     if images and os.path.realpath(images) == os.path.realpath(out):
         raise FsidError(f"{out}: is the folder of the pictures; give another one for the dataset")
     return is_begun(out, dataset)
-
-
-def is_begun(out: str | Path, dataset: DatasetConfig) -> bool:
-    """Whether the config.yaml of `out` is that of `dataset`; FsidError where `out` has samples of another.
-
-    Without samples there is no other, whatever a run that failed before its first shard left there.
-    """
-    out = Path(out)
-    file = out / DATASET_FILE
-    if not file.exists():
-        return False
-    there = _used(from_plain(DatasetConfig, read_yaml(file), source=str(file)))
-    here = in_places_of(there, as_far_as_known(there, _used(dataset)))
-    if there == here or not (any(out.glob("shard-*.tar")) or any(out.glob("*.clean.dng"))):
-        return there == here
-    if there.generate == here.generate and there.seed == here.seed:
-        check_same_origins(out, there)
-    keys = ", ".join(_differing(to_plain(there), to_plain(here)))
-    raise FsidError(
-        f"{out}: already holds another dataset; these differ: {keys}. "
-        "Use another folder, or the same settings"
-    )
-
-
-def _used(dataset: DatasetConfig) -> DatasetConfig:
-    """`dataset` with defaults for what its samples do not depend on: pictures are not rendered."""
-    config, unused = dataset.generate, GenerateConfig()
-    if not config.images:
-        return dataset
-    return replace(dataset, generate=replace(config, **{key: getattr(unused, key) for key in RENDERED}))
-
-
-def _differing(there: dict, here: dict, path: str = "") -> Iterator[str]:
-    for key in there | here:
-        a, b = there.get(key), here.get(key)
-        if isinstance(a, dict) and isinstance(b, dict):
-            yield from _differing(a, b, f"{path}{key}.")
-        elif a != b:
-            yield f"{path}{key} ({a} there, {b} here)"
 
 
 def _unbroken(out: Path, size: int) -> Iterator[Path]:

@@ -9,8 +9,7 @@ from typing import Any
 from fsid.config import from_plain
 from fsid.dataset.attempt import SAMPLE_KEY, Sample, sample_key
 from fsid.dataset.config import DATASET_FILE, DatasetConfig, GenerateConfig
-from fsid.dataset.generate import dataset_config
-from fsid.dataset.origins import check_same_origins
+from fsid.dataset.identity import check_same_origins, dataset_config
 from fsid.dataset.sample import encode, make_sample, remake
 from fsid.dataset.shards import read_record, read_records, shard_path
 from fsid.dataset.worker import rendering

@@ -1,4 +1,4 @@
-"""What a dataset is made from beside its settings: pictures; meshes, textures and skies; noise profiles.
+"""What a dataset is made from: settings, seed; pictures; meshes, textures and skies; noise profiles.
 
     digest = hash of names below their folder and sizes in bytes
 
@@ -20,14 +20,67 @@ from fsid.assets import mesh_sources, sky_sources
 from fsid.assets.file_names import PREFIX
 from fsid.assets.sources import split_source
 from fsid.assets.textures import texture_files
-from fsid.dataset.config import DatasetConfig, GenerateConfig
+from fsid.config import from_plain, to_plain
+from fsid.dataset.config import DATASET_FILE, RENDERED, DatasetConfig, GenerateConfig
 from fsid.dataset.pictures import find_pictures, pictures_digest
-from fsid.errors import FsidError
+from fsid.dataset.tasks import check_cameras, check_task
+from fsid.errors import FsidError, check_kind
 from fsid.scene import SceneConfig
+from fsid.sensor import CameraProfile, load_bayer_profile
 from fsid.sensor.profiles import profiles_digest
+from fsid.yaml_json import read_yaml
 
+_SHARD_SIZE = 16  # samples, at least
 _DIGESTS = ("pictures_digest", "profiles_digest", "files_digest")
 _FOLDERS = ("mesh_folders", "texture_folders", "hdri_folder")
+
+
+def dataset_config(config: GenerateConfig, seed: int, shard_size: int = 0) -> DatasetConfig:
+    """The identity of the dataset of (config, seed); FsidError where what it names does not exist.
+
+    Surveys the folders of meshes, textures and skies, which takes minutes the first time.
+    """
+    check_settings(config)
+    pairs = config.pairs_per_frame
+    shard_size = shard_size or -(-_SHARD_SIZE // pairs) * pairs
+    if shard_size < 1 or shard_size % pairs:
+        raise FsidError(f"shard size {shard_size}: is not a multiple of the {pairs} pairs of a frame")
+    pictures = find_pictures(Path(config.images)) if config.images else []
+    return DatasetConfig(
+        seed,
+        shard_size,
+        config,
+        pictures=len(pictures),
+        pictures_digest=pictures_digest(pictures) if pictures else "",
+        profiles_digest=profiles_digest(config.cameras),
+        files_digest=files_digest(config),
+    )
+
+
+def check_settings(config: GenerateConfig) -> None:
+    """FsidError where what `config` names does not exist, or its parts do not agree; reads no large file."""
+    check_kind(config, GenerateConfig, "generate_config makes one of a file, a name or settings")
+    for camera in config.cameras:
+        _check_noise(load_bayer_profile(camera), config.iso_range[1])
+    check_cameras(config)
+    scene = config.scene
+    for folder in source_folders(scene):
+        if not Path(folder).exists():
+            raise FsidError(f"{folder}: there is no such folder")
+    if config.crops > config.windows and config.checks.duplicate_bits >= 0 and not config.images:
+        raise FsidError(
+            f"crops: {config.crops}, but crop_width and crop_height leave {config.windows} different ones, "
+            "and near-duplicates are refused"
+        )
+    check_task(config, find_pictures(Path(config.images)) if config.images else [])
+
+
+def _check_noise(profile: CameraProfile, highest_iso: float) -> None:
+    """FsidError where noise is more than the white level; up there it would end the run that draws it."""
+    try:
+        profile.level(highest_iso)
+    except FsidError as error:
+        raise FsidError(f"iso_range: {error}") from None
 
 
 def files_digest(config: GenerateConfig) -> str:
@@ -59,13 +112,52 @@ def source_folders(scene: SceneConfig) -> tuple[str, ...]:
     return tuple(filter(None, (*scene.mesh_folders, *scene.texture_folders, scene.hdri_folder)))
 
 
-def as_far_as_known(there: DatasetConfig, here: DatasetConfig) -> DatasetConfig:
+def is_begun(out: str | Path, dataset: DatasetConfig) -> bool:
+    """Whether the config.yaml of `out` is that of `dataset`; FsidError where `out` has samples of another.
+
+    Without samples there is no other, whatever a run that failed before its first shard left there.
+    """
+    out = Path(out)
+    file = out / DATASET_FILE
+    if not file.exists():
+        return False
+    there = _used(from_plain(DatasetConfig, read_yaml(file), source=str(file)))
+    here = _in_places_of(there, _as_far_as_known(there, _used(dataset)))
+    if there == here or not (any(out.glob("shard-*.tar")) or any(out.glob("*.clean.dng"))):
+        return there == here
+    if there.generate == here.generate and there.seed == here.seed:
+        check_same_origins(out, there)
+    keys = ", ".join(_differing(to_plain(there), to_plain(here)))
+    raise FsidError(
+        f"{out}: already holds another dataset; these differ: {keys}. "
+        "Use another folder, or the same settings"
+    )
+
+
+def _used(dataset: DatasetConfig) -> DatasetConfig:
+    """`dataset` with defaults for what its samples do not depend on: pictures are not rendered."""
+    config, unused = dataset.generate, GenerateConfig()
+    if not config.images:
+        return dataset
+    return replace(dataset, generate=replace(config, **{key: getattr(unused, key) for key in RENDERED}))
+
+
+def _differing(there: dict, here: dict, path: str = "") -> Iterator[str]:
+    for key in there | here:
+        a, b = there.get(key), here.get(key)
+        if isinstance(a, dict) and isinstance(b, dict):
+            yield from _differing(a, b, f"{path}{key}.")
+        elif a != b:
+            yield f"{path}{key} ({a} there, {b} here)"
+
+
+def _as_far_as_known(there: DatasetConfig, here: DatasetConfig) -> DatasetConfig:
     """`here` without the digests that `there` lacks: what FSID wrote before they were recorded."""
     unknown: dict[str, Any] = {key: "" for key in _DIGESTS if not getattr(there, key)}
     return replace(here, **unknown)
 
 
-def in_places_of(there: DatasetConfig, here: DatasetConfig) -> DatasetConfig:
+def _in_places_of(there: DatasetConfig, here: DatasetConfig) -> DatasetConfig:
     """`here` with the folders of `there` where they hold the same: folders may move."""
     config = here.generate
     if there.pictures_digest and there.pictures_digest == here.pictures_digest:
