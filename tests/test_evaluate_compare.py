@@ -30,11 +30,12 @@ from fsid.evaluate import (
     write_comparison,
     write_results,
 )
-from fsid.evaluate.compare import MOST_DB, Row, confidence, detailed_window
+from fsid.evaluate.compare import detailed_window
 from fsid.evaluate.comparison_report import comparison_sections
 from fsid.evaluate.metrics import ssim
 from fsid.evaluate.models import model_names
 from fsid.evaluate.report import METRICS, level_label, write_report
+from fsid.evaluate.results import MOST_DB, Row, confidence
 from fsid.evaluate.testset import staged, write_testset
 from fsid.files import write_atomically
 from fsid.sensor import Raw, develop, read_raw, write_dng

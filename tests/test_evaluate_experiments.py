@@ -21,13 +21,14 @@ from fsid.cli.main import main
 from fsid.cli.progress import progress_bar
 from fsid.config import save_settings
 from fsid.errors import FsidError
-from fsid.evaluate.compare import NOISY, ImageRow, Method, summarise, write_images
+from fsid.evaluate.compare import NOISY, Method, summarise
 from fsid.evaluate.dead_leaves import RADIUS_PX, dead_leaves_rand, write_dead_leaves
 from fsid.evaluate.demo import ISOS, DemoConfig, _copy_photographs
 from fsid.evaluate.experiment_config import PHOTOGRAPHS, SOURCES, scale_config
 from fsid.evaluate.experiment_report import gaps, write_experiment_report
-from fsid.evaluate.experiments import TEST_ISOS, _data, _read_images, _testsets, _training
+from fsid.evaluate.experiments import TEST_ISOS, _data, _testsets, _training
 from fsid.evaluate.plots import loss_plot
+from fsid.evaluate.results import ImageRow, read_images, write_images
 from fsid.evaluate.resumable_folder import claimed
 from fsid.evaluate.simulated import LUXES
 from fsid.evaluate.testset import TestImage, TestSet, levels_of
@@ -342,7 +343,7 @@ def test_figures_of_something_else_are_not_taken_for_measured_ones(tmp_path: Pat
     file = tmp_path / "a.csv"
     row = ImageRow("m", "iso800", "s", "i", 40.0, 30.0, 0.5)
     write_images([row], file)
-    assert _read_images(file) == [row]
+    assert read_images(file) == [row]
     whole = file.read_text()
     for wrong in (
         "",
@@ -353,7 +354,7 @@ def test_figures_of_something_else_are_not_taken_for_measured_ones(tmp_path: Pat
     ):
         file.write_text(wrong)
         with pytest.raises(FsidError, match=r"a\.csv: holds no figures of images; delete it"):
-            _read_images(file)
+            read_images(file)
 
 
 def test_nothing_is_written_through_a_link(tmp_path: Path):

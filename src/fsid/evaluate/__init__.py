@@ -7,9 +7,10 @@
 from fsid.evaluate.burst_truth import TruthQuality
 from fsid.evaluate.bursts import burst_testset
 from fsid.evaluate.classical import denoise_classical
-from fsid.evaluate.compare import CLASSICAL, NOISY, Comparison, Method, Row, compare, write_results
+from fsid.evaluate.compare import CLASSICAL, NOISY, Comparison, Method, compare
 from fsid.evaluate.metrics import psnr, ssim
 from fsid.evaluate.models import evaluate_models, model_method, write_comparison
+from fsid.evaluate.results import Row, write_results
 from fsid.evaluate.simulated import simulated_testset
 from fsid.evaluate.testset import TestImage, TestSet, photo_testset, read_testset
 

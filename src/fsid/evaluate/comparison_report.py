@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from fsid.dataset.inspect_plot import as_label
-from fsid.evaluate.compare import Comparison, Crops, Row, confidence, perfect_note
+from fsid.evaluate.compare import Comparison, Crops
 from fsid.evaluate.report import (
     METRICS,
     Picture,
@@ -20,6 +20,7 @@ from fsid.evaluate.report import (
     picture,
     plot,
 )
+from fsid.evaluate.results import Row, confidence, perfect_note
 from fsid.evaluate.testset import ALL_SETS
 from fsid.plurals import counted
 

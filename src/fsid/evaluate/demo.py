@@ -30,19 +30,12 @@ from fsid.dataset import (
 from fsid.dataset.png import stored_preview
 from fsid.denoise import TrainConfig, load_history, train, train_config
 from fsid.errors import FsidError
-from fsid.evaluate.compare import (
-    CLASSICAL,
-    NOISY,
-    Comparison,
-    Method,
-    compare,
-    detailed_window,
-    write_results,
-)
+from fsid.evaluate.compare import CLASSICAL, NOISY, Comparison, Method, compare, detailed_window
 from fsid.evaluate.comparison_report import comparison_sections
 from fsid.evaluate.models import model_method
 from fsid.evaluate.plots import loss_plot, noise_profile_plot
 from fsid.evaluate.report import Section, picture, write_report
+from fsid.evaluate.results import write_results
 from fsid.evaluate.resumable_folder import claimed
 from fsid.evaluate.testset import TESTSET_FILE, photo_testset
 from fsid.files import make_folder, write_atomically

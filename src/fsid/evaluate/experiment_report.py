@@ -17,9 +17,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from fsid.dataset.inspect_plot import as_label
-from fsid.evaluate.compare import ImageRow, Row, perfect_note
 from fsid.evaluate.experiment_config import ExperimentConfig
 from fsid.evaluate.report import METRICS, Section, Table, level_label, method_label, plot, write_report
+from fsid.evaluate.results import ImageRow, Row, perfect_note
 from fsid.evaluate.testset import ALL_SETS
 
 DECIBELS = METRICS[:2]

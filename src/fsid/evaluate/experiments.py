@@ -10,12 +10,10 @@ weights, patches and noise; the data set of a source is one and the same, of the
 
 from __future__ import annotations
 
-import csv
-import io
 import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import fields, replace
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
@@ -32,17 +30,7 @@ from fsid.dataset.pictures import picture_faults, pictures_digest
 from fsid.denoise import TrainConfig, train, train_config
 from fsid.denoise.run_folder import check_same_training
 from fsid.errors import FsidError, refuse_any
-from fsid.evaluate.compare import (
-    CLASSICAL,
-    NOISY,
-    ImageRow,
-    Method,
-    Row,
-    compare,
-    summarise,
-    write_images,
-    write_results,
-)
+from fsid.evaluate.compare import CLASSICAL, NOISY, Method, compare, summarise
 from fsid.evaluate.dead_leaves import write_dead_leaves
 from fsid.evaluate.experiment_config import (
     DEAD_LEAVES,
@@ -55,11 +43,12 @@ from fsid.evaluate.experiment_config import (
 )
 from fsid.evaluate.experiment_report import write_experiment_report
 from fsid.evaluate.models import model_method
+from fsid.evaluate.results import ImageRow, Row, read_images, write_images, write_results
 from fsid.evaluate.resumable_folder import claimed
 from fsid.evaluate.simulated import LUXES, simulated_testset
 from fsid.evaluate.testset import TESTSET_FILE, levels_of, photo_testset, read_testset
 from fsid.evaluate.train_test_overlap import overlap_note
-from fsid.files import make_folder, read_whole
+from fsid.files import make_folder
 from fsid.plurals import counted
 from fsid.scene import VARIANTS
 from fsid.sensor import load_bayer_profile
@@ -273,7 +262,7 @@ def _measured(
             with bar(f"measuring {stem.name} on {testset.name}", "captures") as progress:
                 images += compare(testset, methods, progress=progress).images
         write_images(images, file)
-    images = _read_images(file)
+    images = read_images(file)
     there = {(row.model, row.level, row.set, row.image) for row in images}
     rows: list[Row] = []
     for made in map(read_testset, testsets):
@@ -286,20 +275,3 @@ def _measured(
 
 def _figures(stem: Path) -> Path:
     return stem.with_suffix(".csv")
-
-
-def _read_images(file: Path) -> list[ImageRow]:
-    names = [field.name for field in fields(ImageRow)]
-    numbers = {field.name for field in fields(ImageRow) if field.type == "float"}
-    try:
-        header, *lines = csv.reader(io.StringIO(read_whole(file).decode(), newline=""))
-        if header != names:
-            raise ValueError
-        return [
-            ImageRow(*(float(v) if n in numbers else v for n, v in zip(names, line, strict=True)))  # type: ignore[arg-type]
-            for line in lines
-        ]
-    except (ValueError, csv.Error):
-        raise FsidError(
-            f"{file}: holds no figures of images; delete it, and they are measured again"
-        ) from None

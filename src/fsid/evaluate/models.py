@@ -9,16 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fsid.errors import FsidError
-from fsid.evaluate.compare import (
-    CLASSICAL,
-    NOISY,
-    Comparison,
-    Method,
-    compare,
-    perfect_note,
-    write_images,
-    write_results,
-)
+from fsid.evaluate.compare import CLASSICAL, NOISY, Comparison, Method, compare
+from fsid.evaluate.results import perfect_note, write_images, write_results
 from fsid.evaluate.testset import TestSet, read_testset
 from fsid.files import make_folder, paths_of
 from fsid.plurals import counted
