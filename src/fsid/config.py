@@ -175,7 +175,8 @@ def load_settings(
 ) -> T:
     """Settings of dataclass `kind` from an optional YAML file and overrides, of which the last wins.
 
-    read: the file. FsidError names the sources at fault, without which there would be none, or another.
+    read: what reads the file. FsidError names the sources at fault: those without which there would be no
+    error, or another one.
     """
     layers: list[_Layer] = []
     if file is not None:

@@ -15,7 +15,7 @@ from fsid.errors import FsidError
 
 
 def paths_of(paths: str | Path | Iterable[str | Path]) -> list[Path]:
-    """Paths of a list of them, or of one: a text is a list of letters for Python."""
+    """A list of paths, or a single one, as a list: a single text would be taken for a list of its letters."""
     return [Path(paths)] if isinstance(paths, str | Path) else [Path(path) for path in paths]
 
 
@@ -23,7 +23,7 @@ MOST_BYTES = 1 << 26
 """Of settings, cards and records, the largest of which are a few megabytes."""
 
 _PASSED = re.compile(r"/dev/stdin|/(dev|proc/self)/fd/\d+")
-"""Descriptors of this process: pipes that whoever started it asked for."""
+"""Open descriptors of this process: the only pipes that are read, since whoever started it passed them."""
 
 
 def read_whole(path: Path, most_bytes: int = MOST_BYTES) -> bytes:
@@ -90,9 +90,11 @@ def write_together(files: Mapping[Path, bytes]) -> None:
 
 
 def open_new(part: Path) -> BinaryIO:
-    """An unfinished file to write, and nothing else: a killed process may have left one of this name, and a
-    folder of others hold a link, through which a file elsewhere would be written, or a pipe, which would be
-    waited for. OSError where the disk refuses."""
+    """A new file to write; whatever has its name is removed first. OSError where the disk refuses.
+
+    That may be what a killed process left or, in a folder of others, a link, through which a file elsewhere
+    would be written, or a pipe, on which this process would wait.
+    """
     part.unlink(missing_ok=True)
     return part.open("xb")
 

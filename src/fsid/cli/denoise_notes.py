@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def note_other_frames(layout: Layout, profile: str | None, *, quiet: bool) -> None:
-    """Lines where what is stated is not what the frames had from which the camera was calibrated."""
+    """Lines where the options state something else than the frames had that the profile was measured on."""
     from fsid.sensor import load_bayer_profile
     from fsid.sensor.camera_fit import apart_dn
     from fsid.sensor.fitted_profile import site_blacks
@@ -26,17 +26,17 @@ def note_other_frames(layout: Layout, profile: str | None, *, quiet: bool) -> No
         return
     measured = f"profile {profile} was measured on frames of"
     if layout.cfa != camera.cfa:
-        line = f"--cfa {layout.cfa}: {measured} {camera.cfa}; of such a frame red and blue go wrong"
-        note(line, quiet=quiet)
+        line = f"--cfa {layout.cfa}: {measured} {camera.cfa}"
+        note(f"{line}; if this frame is one of those, red and blue are wrong", quiet=quiet)
     if layout.white_level != camera.white_level:
         line = f"--white-level {layout.white_level}: {measured} {camera.white_level}"
-        note(f"{line}; of such a frame the noise is taken for another than it is", quiet=quiet)
+        note(f"{line}; if this frame is one of those, its noise is misjudged", quiet=quiet)
         return
     sigma2_dn = camera.sigma2 * camera.span**2
     black = site_blacks(camera.measured.black, sigma2_dn)
     if np.abs(black - np.asarray(layout.black_level)).max() > apart_dn(sigma2_dn):
         levels = ",".join(f"{round(level, 1):g}" for level in black.tolist())
-        line = f"without --black-level {levels}, as profile {profile} measured, a cast stays"
+        line = f"without --black-level {levels}, as profile {profile} measured, a colour cast stays"
         note(line, quiet=quiet)
 
 

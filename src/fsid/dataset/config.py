@@ -62,7 +62,7 @@ class GenerateConfig:
     crops, exposures, noise_levels: how many of each a frame gives; it gives their product of pairs. All crops
     of a frame share its exposures (camera, colour, brightness), and each pair has noise of its own.
     crop_width, crop_height: pixels; 0 takes the whole frame.
-    validation_every: every so-manieth scene (or photograph) is for validation, all its pairs; 0: none.
+    validation_every: one of so many scenes (or photographs) is for validation, with all its pairs; 0: none.
     renderer: raster (OpenGL), or reference (path tracer: slow, and its noise is in the clean image).
     quality: of the rasteriser, high or fast. supersampling: edge of the grid of samples per pixel.
     lens_images: at most so many images make one with depth of field; 1: one image, blurred by its depth.

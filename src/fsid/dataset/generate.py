@@ -201,7 +201,7 @@ def _check_own(out: Path, dataset: DatasetConfig) -> bool:
 def _unbroken(out: Path, size: int) -> Iterator[Path]:
     """The shards from the first one on, up to one that is not full or not there.
 
-    More than a smaller count asks for: where a card is, no larger one would settle them any more.
+    Also those beyond the count that is asked for: once there is a card, a later run would not settle them.
     """
     for path in (shard_path(out, number) for number in itertools.count()):
         if not path.exists():

@@ -118,8 +118,8 @@ def _index(
 
 
 def _split_by_scene(mosaics: Collection[StoredMosaic]) -> tuple[StoredMosaic, ...]:
-    """All of a scene are for validation where one is: datasets in one folder may share pictures, and each
-    counts its own to say which are."""
+    """With all images of a scene for validation where one of them is: datasets in one folder may share
+    pictures, and each dataset numbers its own to choose those for validation."""
     kept = {mosaic.scene for mosaic in mosaics if mosaic.split == "validation"}
     return tuple(replace(m, split="validation") if m.scene in kept else m for m in mosaics)
 

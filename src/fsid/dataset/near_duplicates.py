@@ -73,7 +73,8 @@ class _Frame:
 
 @dataclass(frozen=True)
 class Settle:
-    """The task of settling shards, in order; what is not drawn again is copied. looks: of those before."""
+    """The task of settling shards, in order. Frames that are not drawn again are copied. looks: of all frames
+    before these shards."""
 
     paths: tuple[Path, ...]
     config: GenerateConfig
@@ -84,7 +85,7 @@ class Settle:
         return f"the near-duplicates from {self.paths[0].name} on"
 
     def do(self, worker: Worker) -> Looks:
-        """Those of all frames up to the last of these shards."""
+        """The looks of all frames up to the last of these shards."""
         for path in self.paths:
             if _has_open(path, self.looks):
                 self._redraw(path, worker)
@@ -114,8 +115,11 @@ def settle(
     do: Callable[[Settle], Looks],
     read: Callable[[int], None] = lambda shards: None,
 ) -> None:
-    """Settle the frames of all shards; `do` has a worker do a task, which settles a shard that has one to be
-    drawn again and some after it. read(shards): so many are done. Not for pictures, see `Checks`."""
+    """Settle the frames of all shards. Does nothing for pictures, see `Checks`.
+
+    do(task): has a worker settle a shard with a frame that is to be drawn again, and some shards after it.
+    read(shards): called with the number of shards that are done.
+    """
     looks, done = Looks(config.checks.duplicate_bits), 0
     if config.images or config.checks.duplicate_bits < 0:
         return

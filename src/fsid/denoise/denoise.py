@@ -34,8 +34,8 @@ from fsid.sensor.raw import NoiseLevel, Raw, check_raw, four
 
 MAX_STRENGTH = 100.0
 MAX_TOLD = 0.0036
-"""Variance at mid-grey up to which a network is told of more noise than there is: k of 0.02. Beyond
-what it was trained on it loses the colours; up to here the one that ships keeps them to 3 %."""
+"""Largest variance at mid-grey (that of k = 0.02) that a strength above 1 tells a network. Beyond what it was
+trained on a network loses the colours; up to here the one that ships keeps them to 3 %."""
 TILE_PX = 512  # packed pixels: some 500 MB of activations for the small networks
 _POOLING_PATCHES = 16
 _WHOLE_UP_TO = 2  # image sides, in training patches, up to which it is pooled as a whole
@@ -71,9 +71,9 @@ def denoise_raw(
     tile_px: int = TILE_PX,
     progress: Progress | None = None,
 ) -> Raw:
-    """The clean estimate of `raw`, `noise` None (what is left no longer follows the law), all metadata kept;
-    they state that it is denoised. Nothing is brighter than saturation, or than the brightest pixel of `raw`:
-    what saturates has no noise, which no training shows, and of it networks make some percent more.
+    """The clean estimate of `raw`. Its `noise` is None (what is left no longer follows the law), its metadata
+    are those of `raw` and state that it is denoised. Nothing is brighter than saturation or the brightest
+    pixel of `raw`: saturated light has no noise, which no training shows, and networks brighten it.
 
     level: noise of `raw`; None takes `raw.noise`. strength: 0..1 is the share of the noise's amplitude that
     is removed, so that grain is left below 1; above 1 the noise is taken to be that many times as strong, up

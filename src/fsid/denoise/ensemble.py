@@ -2,10 +2,10 @@
 
     clean = 1/n  sum over the first n of the eight symmetries s of a square of  s^-1(denoise(s(noisy)))
 
-A network errs otherwise on a mirrored image than on the image, though it was trained on both alike, and that
-part of its error averages out (Timofte et al. 2016, "Seven ways to improve example-based single image super
-resolution"). A mosaic is turned whole: a mirrored RGGB is a GRBG, and its first row still holds Gr; a
-transpose leaves R and B in place and swaps those of Gr and Gb.
+A network makes other errors on a mirrored image than on the image itself, though it was trained on both
+alike, and what differs averages out (Timofte et al. 2016, "Seven ways to improve example-based single image
+super resolution"). A mosaic is turned whole: a mirrored RGGB is a GRBG, and its first row still holds Gr; a
+transpose leaves R and B in place and swaps the places of Gr and Gb.
 """
 
 from __future__ import annotations

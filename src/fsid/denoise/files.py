@@ -39,10 +39,11 @@ _SMALLEST_PX = 22  # LibRaw takes no smaller image for a RAW
 
 @dataclass(frozen=True)
 class Noise:
-    """A noise level, and in words where it came from. is_estimated: from the image itself. is_left: what was
-    left by a denoiser that removed all noise, as the file states. shown: else, variance that the image shows
-    over that of a level that it contradicts (`fsid.sensor.blind.contradiction`). hot: how many hot or dead
-    pixels were mended.
+    """A noise level, and in words where it came from.
+
+    is_estimated: from the image itself. is_left: the file states that a denoiser removed all noise before.
+    shown: where neither holds and the image contradicts the level (`fsid.sensor.blind.contradiction`), the
+    variance that it shows over that of the level. hot: how many hot or dead pixels were mended.
     """
 
     level: NoiseLevel

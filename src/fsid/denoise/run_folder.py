@@ -46,9 +46,11 @@ def _begun_with(file: Path) -> TrainConfig:
 def prepare_run(
     data_dir: Path, run_dir: Path, config: TrainConfig, initial: Denoiser | None, kept: Sequence[StoredMosaic]
 ) -> None:
-    """`run_dir` is of `config` and data, whatever a run that failed before its first network left there.
+    """Make `run_dir` the folder of a run of `config` on this data; what an earlier run left there that failed
+    before its first network is replaced.
 
-    kept: the images of the data that are held out.
+    kept: the images of the data that are held out. FsidError where a run has begun there with other settings
+    or data, or where the folder holds something else.
     """
     file = run_dir / CONFIG_FILE
     there = _begun_with(file) if file.is_file() else None  # FsidError where the file is of something else

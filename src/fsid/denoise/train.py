@@ -161,7 +161,7 @@ def mean_psnr(estimate: Tensor, clean: Tensor) -> Tensor:
 
 
 def _note_nothing_held_out(data_dir: Path) -> None:
-    why = "none is held out for validation, which takes five scenes or pictures when a training begins"
+    why = "none is held out for validation, which needs five scenes or pictures when a training begins"
     line = f"note: {data_dir}: {why}; {MODEL_FILE} is the network at the last step"
     Terminal(stderr=True).print(Text(line), soft_wrap=True)
 

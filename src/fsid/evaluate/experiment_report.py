@@ -152,7 +152,7 @@ def _standing(results: _Results, names: Sequence[str]) -> Section:
 
     tables = _gap_tables(results, names, ("mean", "lowest level", "paired medians"), cells)
     text = (
-        "What the network gains that was trained on the full variant of the scenes. Mean: over images, seeds "
+        "What a network gains by training on the full variant of the scenes. Mean: over images, seeds "
         "and levels. Paired medians: of the differences image by image, mean of levels, one figure per seed. "
         "Below 0.05 dB a gap is nothing; 0.10 dB with the same sign in two seeds is real."
     )

@@ -115,8 +115,8 @@ def _run(
 def _check(out: Path, config: ExperimentConfig, bar: ProgressBar, workers: int) -> None:
     """Refuse before anything is written what would stop the experiment on its way.
 
-    Its folder is taken once it has begun: the corrected command would be another experiment. Until then every
-    photograph is decoded, to see that it can be.
+    Once it has begun, the folder belongs to it, and a corrected command would be another experiment. So every
+    photograph is decoded before, to see that it can be.
     """
     training = _training(config, config.seeds[0])
     for source in SOURCES[config.kind]:

@@ -3,14 +3,15 @@
     x_f - truth = change_f + noise_f,      C_fg = mean over pixels of (x_f - truth) (x_g - truth)
                                            C = S + v 1,    S_00 = mean change_0^2
 
-The noise of a frame knows nothing of another's, so that eigenvalues of C by noise alone end at
-v (1 + sqrt(F / N))^2 (Marchenko & Pastur 1967). A hand that trembles or a tripod that sinks moves the edges
-of one picture, however fine they are, so that few eigenvectors, far above that end, hold all of it. (The
-gradient of the truth tells too little of it: text is finer than the pixels of a site.) A first frame that
-differs from the others in its own way is an eigenvector by itself.
+The noise of two frames is independent, so the eigenvalues of C by noise alone end at v (1 + sqrt(F / N))^2
+(Marchenko & Pastur 1967). A hand that trembles or a tripod that sinks moves the edges of one picture, however
+fine they are, so that a few eigenvectors, with eigenvalues far above that end, hold all of it. (The gradient
+of the truth shows too little of it: text is finer than the pixels of a site.) A first frame that differs from
+the others in its own way is an eigenvector by itself.
 
-Rows and columns count by themselves: what a pixel has of its own tells more sharply without them. Noise that
-they have in common is another one in each frame, and the flicker of a lamp in a rolling shutter is not.
+The means of rows and columns are measured apart: without them, shifts of single pixels show more clearly. The
+noise that a row has in common is independent from frame to frame; the flicker of a lamp in a rolling shutter
+is not.
 """
 
 from __future__ import annotations

@@ -114,5 +114,5 @@ def perfect_note(images: Iterable[ImageRow]) -> str:
     first = f"{perfect[0].model} of {perfect[0].image} at {perfect[0].level}"
     return (
         f"{counted(len(perfect), 'result')} without error ({first} for one): "
-        f"a PSNR counts as {MOST_DB:g} dB at most, and so many lift a mean"
+        f"a PSNR counts as {MOST_DB:g} dB at most, which still lifts a mean"
     )
