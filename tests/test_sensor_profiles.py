@@ -3,19 +3,22 @@
 import json
 import pickle
 from contextlib import nullcontext
-from dataclasses import replace
+from dataclasses import fields, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from fsid.cli.iso_notes import note_extrapolation
 from fsid.errors import FsidError
 from fsid.evaluate.testset import levels_of
-from fsid.sensor import CameraProfile, far_extrapolated, load_profile, profile_names, save_profile
-from fsid.sensor.camera_profile import Measurement
+from fsid.sensor import CameraProfile, NoiseTerms, far_extrapolated, load_profile, profile_names, save_profile
+from fsid.sensor.camera_profile import MONO, Measurement, Optics
 from fsid.sensor.fit_plot import profile_picture
 from fsid.sensor.iso_law import k_curve, k_law, sigma2_law
 from fsid.sensor.light import light_level
+from fsid.sensor.profiles import profiles_digest
 
 PUBLISHED = {
     "pixel6": "pixel6/main",
@@ -278,6 +281,10 @@ def test_a_profile_is_shared_and_cannot_be_written_to_until_its_file_changes(tmp
         ("black_level: 256", "black_level: 256.5", "black_level"),
         ("iso: 400", "iso: 100", "rising"),
         ("iso: 400", "iso: many", r"levels\[1\].iso"),
+        ("iso: 400", "iso: true", r"levels\[1\].iso"),
+        ("iso: 100", "iso: 0", "rising, positive iso"),
+        ("black_level: 256", "black_level: 4095", "black_level must be an integer from 0 to 4094"),
+        ("bits: 12", "bits: true", "bits must be an integer"),
         ("1.3e-04]", "]", r"levels\[0\].k "),
         ("1.3e-04]", "1e-04]", "1.0e-05"),
         ("[1.0e-04, 1.1", "[-1.0e-04, 1.1", "positive"),
@@ -286,12 +293,15 @@ def test_a_profile_is_shared_and_cannot_be_written_to_until_its_file_changes(tmp
         ("cfa: RGGB", "cfa: RGGB\ndate: 2001-99-99", "YAML"),
         ("cfa: RGGB", "cfa: RGGB\ncfa: BGGR", "cfa is given twice"),
         ("    sigma2: [1.0", "    k_dn: [1.0, 1.0, 1.0, 1.0]\n    sigma2: [1.0", "k_dn"),
+        ("    sigma2: [1.0", "    k_dn: [0.384, 0.422, 0.461, 0.51]\n    sigma2: [1.0", "k_dn is not"),
+        ("    sigma2: [1.0", "    black: [9, 9, 9, 9]\n    sigma2: [1.0", "missing key dark_frames, frames"),
         ("cfa: RGGB", "cfa: RGGB\nxyz_to_camera: [[1, 2], [3]]", "xyz_to_camera"),
         ("k: [1.0e-04", "k: [1.0e+300", r"levels\[0\]: k \+ sigma2"),
         ("k: [1.0e-04", "k: [.inf", r"levels\[0\].k must"),
         ("k: [1.0e-04", f"k: [1{'0' * 400}", r"levels\[0\].k must"),
         ("sigma2: [1.0e-06", "sigma2: [0.0834", r"levels\[0\].sigma2: 0.0834 is not below 1/12; is it in DN"),
-        ("cfa: RGGB", "cfa: RGGB\noptics: {f_number: 2, pixel_pitch_um: 1000}", "optics.pixel_pitch_um must"),
+        ("cfa: RGGB", "cfa: RGGB\noptics: {f_number: 2, pixel_pitch_um: 100}", "optics.pixel_pitch_um must"),
+        ("cfa: RGGB", "cfa: RGGB\noptics: {f_number: 280, pixel_pitch_um: 1}", "optics.f_number must"),
         *(
             (
                 "cfa: RGGB",
@@ -321,6 +331,115 @@ def test_a_wrong_profile_names_file_and_key(tmp_path, old, new, words):
         load_profile(path)
     assert "wrong.yaml" in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def calibrated_profile() -> CameraProfile:
+    """No two facts of it are alike, nor are its two ISOs, nor sites."""
+    rows = np.arange(1.0, 9.0).reshape(2, 4)
+    measured = Measurement(1e-7 * rows, 2e-9 * rows, 500 + rows, (20, 30), (5, 6))
+    return CameraProfile(
+        name="mine",
+        camera="My camera",
+        cfa="GRBG",
+        black_level=512,
+        white_level=65535,
+        bits=16,
+        iso=(100.0, 400.0),
+        k=1e-5 * rows,
+        sigma2=1e-7 * rows,
+        xyz_to_camera=load_profile("pixel6").xyz_to_camera[:2],
+        source="the source",
+        notes="the notes",
+        date="2024-05-06",
+        measured=measured,
+        terms=NoiseTerms(row=0.3),
+        optics=Optics(0.95, 0.8, 0.5, 0.7),
+    )
+
+
+def test_a_calibrated_profile_is_read_as_it_was_saved(tmp_path):
+    made = calibrated_profile()
+    save_profile(tmp_path / "mine.yaml", made)
+    saved = load_profile(tmp_path / "mine.yaml")
+    for of_saved, of_made in ((saved, made), (saved.measured, made.measured)):
+        for key in (field.name for field in fields(of_made) if field.name != "measured"):
+            found, wanted = getattr(of_saved, key), getattr(of_made, key)
+            if isinstance(wanted, np.ndarray):
+                np.testing.assert_allclose(found, wanted, rtol=1e-5, err_msg=key)
+            else:
+                assert found == wanted, key
+
+
+def test_a_saved_profile_has_figures_in_dn_and_says_how_far_its_law_is_from_them(tmp_path):
+    """How far the level is that departs most is to be found again from what the file says of both."""
+    iso, floor = np.array([100.0, 200.0, 400.0, 800.0, 1600.0]), 1 / 12
+    bent = np.ones((5, 4))
+    bent[2] = [1.0, 0.85, 1.05, 1.0]
+    k_dn = (0.1 + 2e-3 * iso)[:, None] * bent
+    sigma2_dn2 = (floor + 0.3 + 1e-3 * iso + 4e-6 * iso**2)[:, None] * bent
+    zero = np.zeros((5, 4))
+    made = replace(
+        calibrated_profile(),
+        iso=tuple(iso),
+        k=k_dn / 65023,
+        sigma2=sigma2_dn2 / 65023**2,
+        measured=Measurement(zero, zero, zero, (2,) * 5, (0,) * 5),
+    )
+    save_profile(tmp_path / "mine.yaml", made)
+    said = yaml.safe_load((tmp_path / "mine.yaml").read_text())
+    np.testing.assert_allclose([level["k_dn"] for level in said["levels"]], k_dn, rtol=1e-5)
+    np.testing.assert_allclose([level["sigma2_dn"] for level in said["levels"]], sigma2_dn2, rtol=1e-5)
+    law = said["law"]
+    np.testing.assert_allclose(law["k"][0], np.array([0.1, 2e-3]) / 65023, rtol=1e-4)
+    np.testing.assert_allclose(law["sigma2"][0], np.array([floor + 0.3, 1e-3, 4e-6]) / 65023**2, rtol=1e-4)
+    for key, values in (("k", made.k), ("sigma2", made.sigma2)):
+        drawn = np.stack([np.polynomial.Polynomial(each)(iso) for each in law[key]], axis=1)
+        farthest = np.abs((values - drawn) / drawn).max()
+        assert 0.03 < farthest < 0.15
+        assert law[f"{key}_departure"] == pytest.approx(farthest, rel=0.01)
+    save_profile(tmp_path / "published.yaml", replace(made, measured=None))
+    assert "law" not in yaml.safe_load((tmp_path / "published.yaml").read_text())
+
+
+def test_the_digest_is_that_of_noise_levels_and_colour_alone(tmp_path):
+    """What a dataset or a test set was begun with: other noise under the same name is told apart."""
+    made = calibrated_profile()
+
+    def digest(**changes) -> str:
+        save_profile(tmp_path / "mine.yaml", replace(made, **changes))
+        return profiles_digest([tmp_path / "mine.yaml", "pixel6"])
+
+    first = digest()
+    assert len(first) == 16
+    assert profiles_digest(["galaxy-s22", Path("pixel6")]) == ""
+    assert digest(name="other", camera="other", source="", notes="", date="", optics=None) == first
+    others = [
+        *({"cfa": "RGGB"}, {"black_level": 513}, {"white_level": 65534}, {"iso": (100.0, 500.0)}),
+        *({key: 1.01 * getattr(made, key)} for key in ("k", "sigma2", "xyz_to_camera")),
+        {"measured": replace(made.measured, k_error=np.ones((2, 4)))},
+        {"measured": replace(made.measured, sigma2_error=np.ones((2, 4)))},
+        *({"terms": NoiseTerms(row=0.4)}, {"measured": None}),
+    ]
+    assert len({first, *(digest(**changes) for changes in others)}) == 1 + len(others)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("cfa: RGGB", f"cfa: {MONO}"),
+        ("black_level: 256", "black_level: 0"),
+        ("bits: 12", "bits: 16"),
+        ("bits: 12\nblack_level: 256\nwhite_level: 4095", "bits: 16\nblack_level: 256\nwhite_level: 65535"),
+        ("bits: 12\nblack_level: 256\nwhite_level: 4095", "bits: 1\nblack_level: 0\nwhite_level: 1"),
+        ("cfa: RGGB", "cfa: RGGB\noptics: {f_number: 0.5, pixel_pitch_um: 50}"),
+        ("cfa: RGGB", "cfa: RGGB\noptics: {f_number: 64, pixel_pitch_um: 0.3}"),
+    ],
+)
+def test_a_profile_of_an_unusual_camera_is_read(tmp_path, old, new):
+    path = tmp_path / "mine.yaml"
+    assert old in GOOD
+    path.write_text(GOOD.replace(old, new, 1))
+    assert len(load_profile(path).iso) == 2
 
 
 @pytest.mark.parametrize(("value", "is_refused"), [("0.0", False), ("-1.0e-06", True)])
