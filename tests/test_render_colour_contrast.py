@@ -30,6 +30,18 @@ def test_colours_have_the_stated_slope_on_luminance():
         assert np.polyfit(np.log(grey).ravel(), now, 1)[0] == pytest.approx(slope, abs=1e-4)
 
 
+@pytest.mark.parametrize(("red", "blue"), [(0.1, 0.0), (0.0, -0.05)])
+def test_one_colour_is_scaled_about_the_median_of_every_fourth_pixel(red, blue):
+    """(Y / median Y)^red, of a skewed frame whose median is no mean; Y / median Y is 1e-3 at least."""
+    grey = np.exp(np.random.default_rng(3).normal(0, 1, (61, 83))).astype(np.float32)
+    grey[1, 1] = 1e-6
+    image = np.stack([grey, grey, grey], axis=2)
+    after = seen(image, red, blue)
+    relative = np.maximum(grey / np.median(grey[::4, ::4]), 1e-3)
+    for colour, extra in enumerate((red, 0.0, blue)):
+        np.testing.assert_allclose(after[..., colour], grey * relative**extra, rtol=1e-5)
+
+
 def test_the_middle_keeps_its_colour_and_dark_grey_turns_green():
     rows = [0.2] * 9 + [0.02, 2.0]
     image = np.repeat(np.repeat(np.array(rows, np.float32)[:, None, None], 8, axis=1), 3, axis=2)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import maximum_filter
 
 from fsid.errors import FsidError
 from fsid.render import Frame, Renderer
@@ -40,14 +41,44 @@ def test_waves_are_magnified_up_to_the_edges() -> None:
     assert np.abs(found - wanted)[..., [0, 2]].std() < 0.015
 
 
+@pytest.mark.parametrize("fringes", [(-0.049, 0.049), (0.049, -0.049), (0.0, -0.03), (0.03, 0.0)])
+@pytest.mark.parametrize("size", [(96, 64), (64, 96), (95, 61)])
+def test_every_pixel_is_where_its_colour_is_magnified_to(size: tuple[int, int], fringes: tuple) -> None:
+    """x = c + (x' - c) / (1 + a) on average, read from slopes along both axes; even light stays even."""
+    camera = replace(FROM_ABOVE, width=size[0], height=size[1], chromatic_aberration=fringes)
+    larger, margin = with_margin(camera)
+    for axis, (wide, more) in enumerate(((camera.height, larger.height), (camera.width, larger.width))):
+        away = np.arange(more) - (more - 1) / 2
+        slope = (away if axis else away[:, None]) + np.full((larger.height, larger.width), 1000.0)
+        found = magnified(np.repeat(slope[..., None], 3, -1).astype(np.float32), camera, margin) - 1000.0
+        inner = (np.arange(wide) - (wide - 1) / 2)[4:-4]
+        for colour, growth in enumerate((fringes[0], 0.0, fringes[1])):
+            line = np.polyfit(inner, found[..., colour].mean(1 - axis)[4:-4], 1)
+            np.testing.assert_allclose(line, (1 / (1 + growth), 0.0), atol=1e-3)
+    even = np.full((larger.height, larger.width, 3), 7.5, np.float32)
+    np.testing.assert_allclose(magnified(even, camera, margin), 7.5, rtol=1e-6)
+
+
+@pytest.mark.parametrize(("size", "fringes"), [((1920, 1080), (0.01, -0.049)), ((1080, 1920), (-0.049, 0.0))])
+def test_a_margin_holds_what_is_interpolated_and_hardly_more(size: tuple[int, int], fringes: tuple) -> None:
+    """The outermost pixel is read from 1 / (1 + a) times as far from the middle, and the three beyond it."""
+    camera = replace(FROM_ABOVE, width=size[0], height=size[1], chromatic_aberration=fringes)
+    outermost = 1919 / 2 * (1 / 0.951 - 1)
+    assert outermost + 3 <= with_margin(camera)[1] <= outermost + 6
+
+
 def test_a_lamp_has_no_black_ring() -> None:
-    """Nothing beside it loses more than a quarter per axis, and nothing is much brighter than the lamp."""
+    """Nothing beside it loses more than a quarter per axis, and nothing is much brighter than the lamp, or
+    four pixels beside it than what is there."""
     larger, margin = with_margin(FRINGED)
     image = np.ones((larger.height, larger.width, 3), np.float32)
     image[20:40, 30:60] = 1000.0
     found = magnified(image, FRINGED, margin)
     assert found.min() >= 0.75**2
     assert found.max() <= 1000.0 * 1.25**2
+    beside = maximum_filter(found > 500.0, (9, 9, 1))
+    assert 0.1 < beside.mean() < 0.3
+    assert found[~beside].max() <= 1.25**2
 
 
 def test_a_lens_without_fringes_needs_no_margin() -> None:
