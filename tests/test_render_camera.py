@@ -17,7 +17,7 @@ from fsid.render.drawable import Drawable, View
 from fsid.render.exposure import Shot, shots_of
 from fsid.render.flow import flow_between
 from fsid.scene import SceneConfig, sample
-from fsid.scene.distortion import distorted, fold_radius, undistorted
+from fsid.scene.distortion import distorted, fold_radius, rays_of, stretch_of, undistorted
 from fsid.scene.model import Camera, Distortion, Motion, Transform
 from render_scenes import FROM_ABOVE, block, draw, grid, lambertian, plain, point_light, sphere, view
 
@@ -26,6 +26,10 @@ BARREL = Distortion("brown-conrady", (-0.25, 0.06, 0.002, -0.001, 0.0))
 PINCUSHION = Distortion("brown-conrady", (0.12, 0.01, 0.0, 0.0, 0.0))
 FISHEYE = Distortion("fisheye", (0.05, -0.01, 0.002, 0.0))
 LENSES = {"barrel": BARREL, "pincushion": PINCUSHION, "fisheye": FISHEYE}
+ALL_TERMS = {
+    "brown-conrady": Distortion("brown-conrady", (0.11, -0.13, 0.017, -0.019, 0.07)),
+    "fisheye": Distortion("fisheye", (0.11, -0.07, 0.05, -0.013)),
+}
 LABEL_SAMPLE = 0.75
 """Of the 2 x 2 samples of a pixel, that of depth, normal and id lies here."""
 
@@ -98,10 +102,73 @@ def test_a_pane_of_glass_shows_what_is_behind_it_where_the_lens_bends_it_to(
     assert np.abs(glazed.radiance - bare).mean() < 0.02 * bare.mean()
 
 
-@pytest.mark.parametrize("name", LENSES)
-def test_the_lens_can_be_inverted(name: str) -> None:
+def test_every_coefficient_is_that_of_opencv() -> None:
+    """At (0.6, -0.8), one from the middle, r is 1 and an angle is pi / 4; at half of it r2 is 1/4."""
+    k1, k2, p1, p2, k3 = ALL_TERMS["brown-conrady"].coefficients
+    for scale in (1.0, 0.5):
+        x, y, r2 = 0.6 * scale, -0.8 * scale, scale**2
+        radial = 1 + k1 * r2 + k2 * r2**2 + k3 * r2**3
+        right = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x**2)
+        wanted = right, y * radial + p1 * (r2 + 2 * y**2) + 2 * p2 * x * y
+        np.testing.assert_allclose(distorted(ALL_TERMS["brown-conrady"], np.array([x, y])), wanted)
+        angle = np.arctan(scale)
+        bent = angle + sum(k * angle ** (2 * i + 3) for i, k in enumerate(ALL_TERMS["fisheye"].coefficients))
+        wanted = bent * np.array([0.6, -0.8])
+        np.testing.assert_allclose(distorted(ALL_TERMS["fisheye"], np.array([x, y])), wanted)
+
+
+@pytest.mark.parametrize("lens", [*LENSES.values(), *ALL_TERMS.values()])
+def test_the_lens_can_be_inverted(lens: Distortion) -> None:
     points = np.random.default_rng(0).uniform(-0.8, 0.8, (200, 2))
-    np.testing.assert_allclose(undistorted(LENSES[name], distorted(LENSES[name], points)), points, atol=1e-7)
+    np.testing.assert_allclose(undistorted(lens, distorted(lens, points)), points, atol=1e-7)
+
+
+@pytest.mark.parametrize("lens", ALL_TERMS.values())
+@pytest.mark.parametrize(("width", "height"), [(96, 64), (48, 80)])
+def test_what_a_lens_looks_up_covers_its_image_and_a_pixel_beyond(
+    lens: Distortion, width: int, height: int
+) -> None:
+    """Its rays are undistorted places of the image; half the size that it needs is the largest of them."""
+    camera = replace(FROM_ABOVE, width=width, height=height, fov_deg=70.0, distortion=lens)
+    image, rays, half = rays_of(lens, camera)
+    focal_px = width / 2 / np.tan(np.radians(35))
+    wanted = np.array([width, height]) / 2 / focal_px * (1 + 2 / min(width, height))
+    np.testing.assert_allclose(image[[0, -1], [0, -1]], [-wanted, wanted])
+    np.testing.assert_allclose(distorted(lens, rays), image, atol=1e-8)
+    np.testing.assert_allclose(half, np.abs(rays).max((0, 1)), rtol=2e-3)
+    assert (half > np.abs(rays).max((0, 1))).all()
+
+
+@pytest.mark.parametrize("lens", [BARREL, *ALL_TERMS.values()])
+@pytest.mark.parametrize(("width", "height"), [(96, 64), (48, 80)])
+def test_a_lens_stretches_by_the_root_of_its_determinant(lens: Distortion, width: int, height: int) -> None:
+    """Of its formula, at the middle of every pixel, by small differences."""
+    camera = replace(FROM_ABOVE, width=width, height=height, fov_deg=70.0, distortion=lens)
+    x, y = np.meshgrid(np.arange(width) + 0.5 - width / 2, np.arange(height) + 0.5 - height / 2)
+    points = undistorted(lens, np.stack([x, y], -1) / (width / 2) * np.tan(np.radians(35)))
+    step = 1e-5
+    columns = [
+        (distorted(lens, points + shift) - distorted(lens, points - shift)) / (2 * step)
+        for shift in (np.array([step, 0.0]), np.array([0.0, step]))
+    ]
+    expected = np.sqrt(np.linalg.det(np.stack(columns, -1)))
+    np.testing.assert_allclose(stretch_of(lens, camera), expected, rtol=0.01)
+    assert np.ptp(expected) > 0.05
+
+
+@pytest.mark.parametrize(
+    ("lens", "narrow", "wide"),
+    [
+        (Distortion("fisheye", (0.0,) * 4), *np.radians([79.0, 82.0]) / np.sqrt(2)),  # in the corner
+        (Distortion("brown-conrady", (0.0,) * 5), 5.8, 6.1),  # at the side
+    ],
+)
+def test_no_lens_looks_more_than_80_degrees_aside(lens: Distortion, narrow: float, wide: float) -> None:
+    """To a tangent of 6. narrow, wide: half the width of a square image, focal lengths."""
+    camera = replace(FROM_ABOVE, width=2000, height=2000, distortion=lens)
+    lens_of(replace(camera, fov_deg=float(2 * np.degrees(np.arctan(narrow)))))
+    with pytest.raises(FsidError, match="beyond 160 degrees"):
+        lens_of(replace(camera, fov_deg=float(2 * np.degrees(np.arctan(wide)))))
 
 
 @pytest.mark.parametrize(
@@ -229,6 +296,16 @@ def test_a_lens_reaches_to_where_its_image_folds(name: str) -> None:
     seen = distorted(FOLDS[name], np.stack([radius, 0 * radius], -1))[:, 0]
     assert (np.sign(np.diff(seen))[[0, 1, 3, 4]] == [1, 1, -1, -1]).all()
     assert fold_radius(BARREL) == fold_radius(FISHEYE) == fold_radius(None) == np.inf
+
+
+def test_an_image_folds_where_its_radius_stops_to_grow_first() -> None:
+    """d/dr of r + k1 r^3 + k2 r^5 + k3 r^7: (1 - r^2) (1 - r^2 / 2) is 0 at 1 and at the root of 2."""
+    twice = Distortion("brown-conrady", (-0.5, 0.1, 0.02, -0.01, 0.0))
+    assert fold_radius(twice) == pytest.approx(1.0)
+    late = Distortion("brown-conrady", (0.0, 0.0, 0.02, -0.01, -1 / 7 / 1.5**6))
+    assert fold_radius(late) == pytest.approx(1.5)
+    assert fold_radius(Distortion("fisheye", (-1 / 3 / 1.5**2, 0.0, 0.0, 0.0))) == pytest.approx(np.tan(1.5))
+    assert fold_radius(Distortion("fisheye", (-1 / 3 / 1.6**2, 0.0, 0.0, 0.0))) == np.inf
 
 
 @pytest.mark.parametrize("name", FOLDS)

@@ -478,8 +478,10 @@ def test_views_towards_the_sky_have_the_horizon_where_it_is_asked_for():
         assert ahead[2] / np.hypot(*ahead[:2]) == pytest.approx(1.5 * half)
         assert camera.position_m[2] < 0.5 + 3.0 * np.sin(np.radians(0.2 * 55))
     room = dataclasses.replace(FEW, background=BackgroundConfig(kind_shares=(1.0, 0.0, 0.0, 0.0)))
-    never = dataclasses.replace(room, camera=CameraConfig(skyward_share=0.0))
-    assert scene(3, config=room) == scene(3, config=never)
+    always, never = (
+        dataclasses.replace(room, camera=CameraConfig(skyward_share=share)) for share in (1.0, 0.0)
+    )
+    assert scene(3, config=always) == scene(3, config=never)
 
 
 def test_without_sun_the_sky_is_overcast():

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.signal import find_peaks
+from scipy.spatial.transform import Rotation
 
 from fsid.assets import build_background, ground_height_m
 from fsid.errors import FsidError
@@ -21,7 +23,10 @@ from fsid.scene import (
     SceneConfig,
     sample,
 )
+from fsid.scene.distortion import distorted
 from fsid.scene.lens import MAX_FISHEYE_DEG, check_distortion, corner_radius, lens_rand
+from fsid.scene.model import Background
+from fsid.scene.view import burst_rand, camera_rand
 
 CAMERA = Camera((0.0, -2.0, 1.0), (0.0, 0.0, 0.3), (0.0, 0.0, 1.0), 60.0, 96, 64)
 
@@ -78,7 +83,7 @@ def test_no_eye_of_a_wide_rig_stands_behind_a_wall_or_in_a_hill(kind):
 
 
 def test_a_burst_starts_with_the_single_picture_and_trembles_by_the_configured_amount():
-    """Standard deviations of position and angle over a long burst are those drawn from the knobs."""
+    """Position and angle vary about as much as the knobs say."""
     knobs = MotionConfig(frames=400, interval_s=1 / 30, shake_deg=(0.2, 0.2), shake_m=(0.002, 0.002))
     frames = scene(motion=knobs).cameras
     first, single = frames[0], scene().cameras[0]
@@ -90,6 +95,39 @@ def test_a_burst_starts_with_the_single_picture_and_trembles_by_the_configured_a
     np.testing.assert_allclose(spread, 0.002, rtol=0.35)
     angles = np.degrees(np.arccos(np.clip([axis(c) @ axis(first) for c in frames], -1, 1)))
     assert 0.05 < angles.mean() < 1.0
+
+
+def axes(camera):
+    """(3, 3) right, up, forward."""
+    return np.stack([np.cross(axis(camera), camera.up), camera.up, axis(camera)])
+
+
+def test_the_tremor_of_a_hand_is_six_lines_of_one_to_twelve_hertz_of_the_configured_size():
+    """About each axis and along it; as many in an octave as in the next, all of one speed."""
+    knobs = MotionConfig(frames=1000, interval_s=0.04, shake_deg=(0.2, 0.2), shake_m=(0.002, 0.002))
+    hertz, lines, above_6_hz = np.fft.rfftfreq(1000, 0.04), [], []
+    for seed in range(4):
+        frames = burst_rand(np.random.default_rng(seed), knobs, [CAMERA])
+        shift_m = np.array([camera.position_m for camera in frames])
+        turn = Rotation.from_matrix([axes(camera).T @ axes(frames[0]) for camera in frames]).as_rotvec()
+        for moved, size in ((shift_m, 0.002), (np.degrees(turn), 0.2)):
+            assert np.sqrt(moved.var(0).mean()) == pytest.approx(size, rel=0.1)
+        speed = np.array([(*camera.velocity_m_s, *camera.spin_deg_s) for camera in frames])
+        for each in np.abs(np.fft.rfft(speed * np.hanning(1000)[:, None], axis=0).T):
+            assert (each[(hertz > 0.9) & (hertz < 12.1)] ** 2).sum() > 0.99 * (each**2).sum()
+            found, _ = find_peaks(each, height=each.max() / 2)
+            lines.append(len(found))
+            above_6_hz.append((each[hertz > 6] ** 2).sum() / (each**2).sum())
+    assert 4.5 < np.mean(lines) <= 6.1
+    assert np.mean(above_6_hz) == pytest.approx(1 / np.log2(12), abs=0.1)
+
+
+def test_the_size_of_tremor_is_log_uniform():
+    """Of a knob of three decades half the bursts are in the lower one and a half."""
+    knobs = MotionConfig(frames=30, interval_s=0.1, shake_deg=(0.0, 0.0), shake_m=(1e-4, 1e-1))
+    bursts = (burst_rand(np.random.default_rng(seed), knobs, [CAMERA]) for seed in range(40))
+    sizes = [np.std([camera.position_m for camera in frames], axis=0).mean() for frames in bursts]
+    assert np.median(np.log10(sizes)) == pytest.approx(-2.5, abs=0.5)
 
 
 def test_velocity_and_spin_are_the_derivatives_of_the_pose():
@@ -109,6 +147,18 @@ def test_a_still_camera_takes_no_time():
     assert scene().motions == ()
 
 
+def test_the_time_of_one_exposure_blurs_a_single_picture():
+    knobs = MotionConfig(exposure_s=(0.02, 0.02), moving_share=1.0)
+    drawn = scene(motion=knobs)
+    (camera,) = drawn.cameras
+    assert camera.exposure_s == 0.02
+    assert np.linalg.norm(camera.velocity_m_s) > 0
+    assert np.linalg.norm(camera.spin_deg_s) > 0
+    assert camera.position_m == pytest.approx(scene().cameras[0].position_m)
+    assert len(drawn.motions) == len(drawn.objects)
+    assert scene(motion=MotionConfig(moving_share=1.0)).motions == ()  # no time passes
+
+
 def test_objects_move_as_configured():
     knobs = MotionConfig(frames=2, moving_share=0.5, speed_m_s=(0.1, 0.2), spin_deg_s=(5.0, 6.0))
     config = SceneConfig(objects=(60, 60), mesh_families=("toy_blocks",), motion=knobs)
@@ -121,6 +171,8 @@ def test_objects_move_as_configured():
     assert ((speeds[moving] >= 0.1) & (speeds[moving] <= 0.2)).all()
     assert ((spins[moving] >= 5) & (spins[moving] <= 6)).all()
     assert (spins[~moving] == 0).all()
+    along = np.array([np.dot(motion.velocity_m_s, motion.spin_deg_s) for motion in s.motions])
+    assert np.abs(along[moving] / (speeds * spins)[moving]).mean() == pytest.approx(0.5, abs=0.2)
 
 
 def test_the_lens_changes_nothing_but_the_lens():
@@ -186,6 +238,88 @@ def test_a_distortion_without_inverse_is_refused(distortion, message):
         check_distortion(distortion, 0.7)
 
 
+CORNER = np.tan(np.radians(30)) * np.hypot(1, 64 / 96)
+
+
+def lenses(count, camera=CAMERA, **knobs):
+    """Lenses of as many seeds with these knobs, all of whose shares are 0 unless given."""
+    shares = ("distortion", "fisheye", "blur", "vignetting", "fringe", "soft", "sharp")
+    config = LensConfig(**{f"{name}_share": 0.0 for name in shares} | knobs)
+    return [lens_rand(np.random.default_rng(seed), config, camera) for seed in range(count)]
+
+
+@pytest.mark.parametrize("displacement", [-0.08, 0.08])
+def test_a_drawn_distortion_moves_the_corner_by_the_configured_share(displacement, monkeypatch):
+    """At most three tenths of it by the fourth power of the radius; and decentring by 0.0005 of the corner.
+    That it can be rendered is another test's."""
+    monkeypatch.setattr("fsid.scene.lens.rays_of", lambda *arguments: None)
+    drawn = [lens.distortion for lens in lenses(200, distortion_share=1.0, distortion=(displacement,) * 2)]
+    k1, k2, p1, p2, k3 = np.array([distortion.coefficients for distortion in drawn]).T
+    np.testing.assert_allclose(k1 * CORNER**2 + k2 * CORNER**4, displacement)
+    second = k2 * CORNER**4 / displacement
+    assert np.abs(second).max() <= 0.3
+    assert second.std() == pytest.approx(0.6 / np.sqrt(12), rel=0.15)
+    assert (np.std([p1, p2], axis=1) * CORNER).tolist() == pytest.approx([0.0005] * 2, rel=0.2)
+    assert not k3.any()
+    corner = np.array([[CORNER, 0.0], [0.0, -CORNER]])
+    for distortion in drawn:
+        radius = np.linalg.norm(distorted(distortion, corner), axis=1)
+        np.testing.assert_allclose(radius / CORNER - 1, displacement, atol=0.008)
+
+
+def test_a_distortion_that_would_fold_is_weakened_and_not_left_out(monkeypatch):
+    monkeypatch.setattr("fsid.scene.lens.rays_of", lambda *arguments: None)
+    moved = []
+    for lens in lenses(30, distortion_share=1.0, distortion=(-0.5, -0.5)):
+        k1, k2, *_ = lens.distortion.coefficients
+        moved.append(k1 * CORNER**2 + k2 * CORNER**4)
+    assert {-0.15, -0.25} <= set(np.round(moved, 9)) <= {-0.05, -0.15, -0.25, -0.35}
+
+
+def test_a_drawn_fisheye_is_nearly_equidistant_and_sees_less_than_80_degrees_aside(monkeypatch):
+    """Whatever the share of distortion is; a narrower view stays as it is."""
+    monkeypatch.setattr("fsid.scene.lens.rays_of", lambda *arguments: None)
+    drawn = lenses(200, fisheye_share=1.0)
+    assert {lens.fov_deg for lens in drawn} == {60.0}
+    bend = np.array([lens.distortion.coefficients for lens in drawn])
+    np.testing.assert_allclose(bend.std(0), 0.02 * np.array([1.0, 0.3, 0.1, 0.03]), rtol=0.2)
+    wide = dataclasses.replace(CAMERA, fov_deg=130.0)
+    for lens in lenses(20, wide, fisheye_share=1.0):
+        assert corner_radius(lens) == pytest.approx(0.9 * np.radians(80))
+
+
+def test_each_knob_of_the_lens_is_its_own():
+    """Light lost in the corner is the configured loss, red and blue have a range and a draw each."""
+    knobs = {"vignetting": (0.25, 0.25), "contrast_red": (0.1, 0.11), "contrast_blue": (0.2, 0.21)}
+    drawn = lenses(100, vignetting_share=1.0, fringe_share=1.0, soft_share=1.0, fringe=(-0.01, 0.01), **knobs)
+    losses = -np.array([lens.vignetting for lens in drawn])
+    np.testing.assert_allclose(losses.sum(1), 0.25)
+    assert losses.min() >= 0
+    np.testing.assert_allclose(losses.mean(0) / 0.25, np.array([4, 2, 1]) / 7, atol=0.08)
+    red, blue = np.array([lens.chromatic_aberration for lens in drawn]).T
+    assert abs(np.corrcoef(red, blue)[0, 1]) < 0.3
+    for lens in drawn:
+        assert 0.1 <= lens.colour_contrast[0] <= 0.11
+        assert 0.2 <= lens.colour_contrast[1] <= 0.21
+        assert lens.softness_px > 0
+        assert lens.sharpening == 0
+    assert {lens.softness_px for lens in lenses(10, sharp_share=1.0)} == {0.0}
+
+
+def test_a_distortion_is_sane_while_its_radius_grows_by_a_tenth_until_two_percent_beyond_the_corner():
+    """r (1 + k r^2) is at 1.02 x 0.7, with a slope of 0.1, where r = 1.02 and k = -0.3 / r^2."""
+    edge = -0.3 / 1.02**2
+    check_distortion(Distortion("brown-conrady", (edge + 1e-3, 0.0, 0.0, 0.0, 0.0)), 0.7)
+    for refused in ((edge - 1e-3, 0.0, 0.0, 0.0, 0.0), (edge + 1e-3, 0.0, 0.01, 0.0, 0.0)):
+        with pytest.raises(FsidError, match="folds"):
+            check_distortion(Distortion("brown-conrady", refused), 0.7)
+    equidistant = Distortion("fisheye", (0.0,) * 4)
+    check_distortion(equidistant, np.radians(80) / 1.03)
+    with pytest.raises(FsidError, match="folds"):
+        check_distortion(equidistant, np.radians(80) / 1.01)
+    assert corner_radius(CAMERA) == pytest.approx(CORNER)
+
+
 def test_views_are_low_level_and_high():
     """Walls and horizon are seen as well as the ground, and no low camera stands among the objects."""
     elevations = []
@@ -197,6 +331,24 @@ def test_views_are_low_level_and_high():
             assert np.hypot(x, y) > 1.1
     assert min(elevations) < 12
     assert max(elevations) > 50
+
+
+def test_views_come_from_all_around_and_look_at_the_focus_and_beside_it():
+    """By 0.12 of the distance along each axis; up is up, and no wall is near."""
+    wide = Background("room", (40.0, 40.0, 20.0), {})
+    config = CameraConfig(skyward_share=0.0, roll_deg=0.0, distance_m=(0.5, 5.0))
+    aside, octants = [], []
+    for seed in range(400):
+        camera, focus = camera_rand(np.random.default_rng(seed), config, wide, 96, 64)
+        away = np.subtract(camera.position_m, focus)
+        aside.append(np.subtract(camera.target_m, focus) / np.linalg.norm(away))
+        octants.append(int(np.arctan2(away[1], away[0]) // (np.pi / 4)))
+        assert 0.2 <= focus[2] <= 0.5
+        assert tuple(focus[:2]) == (0, 0)
+        assert camera.up[2] > 0
+    np.testing.assert_allclose(np.std(aside, axis=0), 0.12, rtol=0.12)
+    np.testing.assert_allclose(np.mean(aside, axis=0), 0.0, atol=0.025)
+    assert np.unique(octants, return_counts=True)[1].tolist() == pytest.approx([50] * 8, abs=25)
 
 
 def test_no_camera_stands_in_a_hill():
