@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 
 from fsid.errors import FsidError
 from fsid.render import Renderer
 from fsid.render.camera import lens_of
-from fsid.render.defocus import defocus
+from fsid.render.defocus import _blurred, defocus
 from fsid.scene.distortion import distorted
 from fsid.scene.model import Distortion, Transform
 from render_scenes import FROM_ABOVE, bake_plain, grid, lambertian, plain, sphere, view
@@ -61,9 +62,31 @@ def test_a_near_thing_out_of_focus_covers_what_is_sharp_softly() -> None:
     image = np.where(depth[..., None] == 1.0, np.float32(1.0), np.float32(0.0)) * np.ones(3, np.float32)
     row = defocus(image, depth, aperture_of(16.0, 1.0), FOCUS_M, FOCAL_PX)[30, :, 0]
     assert np.diff(row).max() < 1e-4
+    assert np.diff(row).min() > -1.05 / (4 * np.sqrt(2 * np.pi))  # nowhere steeper than the middle
     low, high = (np.interp(-level, -row, np.arange(120)) for level in (0.9, 0.1))
     assert high - low == pytest.approx(0.687 * 16, rel=0.2)
     assert (low + high) / 2 == pytest.approx(59.5, abs=1.0)
+
+
+@pytest.mark.parametrize("sigma_px", [0.5, 0.85, 1.4, 2.4, 6.8, 11.5])
+@pytest.mark.parametrize("size", [(160, 162), (129, 163)])
+def test_a_blur_at_half_the_resolution_is_a_gaussian(size: tuple[int, int], sigma_px: float) -> None:
+    """In its place, also where sides are odd; even light stays even up to the borders."""
+    image = np.zeros(size)
+    image[45:-45, 45:-45] = np.random.default_rng(0).normal(size=(size[0] - 90, size[1] - 90))
+    image = 7 * gaussian_filter(image, 2.0).astype(np.float32)  # of a standard deviation of 1
+    seen = _blurred(image, sigma_px)
+    assert seen.shape == size
+    np.testing.assert_allclose(seen, gaussian_filter(image, sigma_px), atol=0.04)
+    np.testing.assert_allclose(_blurred(np.ones(size, np.float32), sigma_px), 1.0, rtol=1e-5)
+
+
+def test_even_light_stays_even_whatever_stands_before_what() -> None:
+    """Neither darker nor lighter along edges, where layers of several depths lie over each other."""
+    depth = np.random.default_rng(0).choice([0.8, 1.3, FOCUS_M, 3.0, np.inf], (9, 13)).astype(np.float32)
+    depth = np.repeat(np.repeat(depth, 11, 0), 7, 1)
+    image = np.full((*depth.shape, 3), 7.5, np.float32)
+    np.testing.assert_allclose(defocus(image, depth, 0.1, FOCUS_M, FOCAL_PX), 7.5, rtol=1e-4)
 
 
 @pytest.mark.parametrize("images", [1, 16])
