@@ -15,7 +15,7 @@ import pytest
 
 from fsid.render import Renderer
 from fsid.render.drawable import Drawable, View
-from fsid.render.reflectance import clear_fresnel
+from fsid.render.reflectance import clear_fresnel, reflectance_table
 from fsid.scene.model import Camera, Light
 from render_scenes import STILL, bake_plain, grid, plain, view
 
@@ -57,6 +57,27 @@ def test_a_smooth_coat_reflects_what_fresnel_says(renderer: Renderer, angle_deg:
 def test_both_forms_of_fresnels_equations_agree(angle_deg: float) -> None:
     cosine = np.array(np.cos(np.radians(angle_deg)))
     assert clear_fresnel(cosine) == pytest.approx(fresnel(angle_deg), rel=1e-9)
+
+
+@pytest.mark.parametrize("row", [8, 16, 30])
+@pytest.mark.parametrize("column", [3, 16, 30])
+def test_the_table_is_the_integral_over_all_directions_of_light(row: int, column: int) -> None:
+    """Of D G F / (4 nv) by a grid in angle, GGX and Smith's masking with alpha = roughness^2."""
+    roughness, nv = (np.array([row, column]) + 0.5) / 32
+    a2 = roughness**4
+    theta, phi = (np.arange(400) + 0.5)[:, None] / 400 * np.pi / 2, (np.arange(800) + 0.5) / 800 * 2 * np.pi
+    nl = np.cos(theta)
+    vl = np.sqrt(1 - nv**2) * np.sin(theta) * np.cos(phi) + nv * nl
+    half = np.sqrt(2 + 2 * vl)
+    nh, vh = (nv + nl) / half, (1 + vl) / half
+    d = a2 / (np.pi * (nh**2 * (a2 - 1) + 1) ** 2)
+    masking = 2 * nv * nl / sum(a * np.sqrt(a2 + (1 - a2) * b**2) for a, b in ((nl, nv), (nv, nl)))
+    each = d * masking / (4 * nv) * np.sin(theta) * (np.pi / 800) * (2 * np.pi / 800)
+    schlick = (1 - vh) ** 5
+    exact = np.vectorize(fresnel)(np.degrees(np.arccos(np.linspace(0, 1, 500))))
+    coat = np.interp(vh, np.linspace(0, 1, 500), exact)
+    wanted = [(each * share).sum() for share in (1 - schlick, schlick, coat)]
+    np.testing.assert_allclose(reflectance_table()[row, column], wanted, rtol=0.02, atol=1e-3)
 
 
 def test_lights_and_surroundings_are_reflected_alike(renderer: Renderer) -> None:

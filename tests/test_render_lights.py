@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +17,7 @@ from fsid.render import Renderer
 from fsid.render.drawable import Drawable, background_drawable, panel_drawable, view_of
 from fsid.render.lamps import hoods_apart, lamps_of
 from fsid.render.room import light_sky
-from fsid.render.sky import angles, panorama
+from fsid.render.sky import _clouds, _lattice, angles, panorama
 from fsid.scene import SceneConfig, sample
 from fsid.scene.model import ZERO, Background, Camera, Light, Sky, Transform, Vec3
 from render_scenes import (
@@ -346,6 +347,12 @@ def test_what_shines_to_both_sides_is_no_display() -> None:
         assert sum(len(piece.displays) for piece in pieces) == count
 
 
+def test_angles_are_those_of_the_middles_of_texels() -> None:
+    elevation, azimuth = angles(3)
+    np.testing.assert_allclose(np.degrees(elevation), [60, 0, -60], atol=1e-9)
+    np.testing.assert_allclose(np.degrees(azimuth), [30, 90, 150, 210, 270, 330])
+
+
 def test_a_grey_sky_is_a_furnace(renderer: Renderer) -> None:
     """Under a sky of one radiance in all directions a surface shows albedo times it; and the sky is seen."""
     radiance = np.full((32, 64, 3), 0.7, np.float32)
@@ -369,8 +376,51 @@ def test_a_procedural_sky_has_its_mean(cloudiness: float) -> None:
     assert picture.min() >= 0
 
 
+def test_a_clear_sky_is_deepest_overhead_and_pale_at_the_horizon() -> None:
+    """By (1 - sin elevation)^4 between both; what is below the horizon is a quarter as bright as it."""
+    rows = panorama(Sky("procedural", ONE))[:, 0]
+    elevation, _ = angles(len(rows))
+    up, low = elevation > 0, (1 - np.sin(elevation)) ** 4
+    for colour in range(3):
+        slope, zenith = np.polyfit(low[up], rows[up, colour], 1)
+        np.testing.assert_allclose(rows[up, colour], zenith + slope * low[up], rtol=1e-4)
+        np.testing.assert_allclose(rows[~up, colour], 0.25 * (zenith + slope), rtol=1e-4)
+    assert rows[0, 2] / rows[0, 0] > 2.5 * rows[up][-1, 2] / rows[up][-1, 0]
+
+
+def test_noise_goes_through_its_lattice_smoothly() -> None:
+    """At whole places its numbers, which repeat every 64; between them by 3 u^2 - 2 u^3."""
+    values = np.random.default_rng(0).random((64, 64))
+    x, y = np.meshgrid(np.arange(-70.0, 70), np.arange(-70.0, 70))
+    np.testing.assert_array_equal(_lattice(values, x, y), values[y.astype(int) % 64, x.astype(int) % 64])
+    u = 3 * 0.3**2 - 2 * 0.3**3
+    np.testing.assert_allclose(
+        _lattice(values, np.array(5.3), np.array(7.0)), (1 - u) * values[7, 5] + u * values[7, 6]
+    )
+    np.testing.assert_allclose(
+        _lattice(values, np.array(5.0), np.array(7.3)), (1 - u) * values[7, 5] + u * values[8, 5]
+    )
+
+
+def test_clouds_are_a_flat_layer_that_ends_at_the_horizon() -> None:
+    """Around the zenith all directions meet in one place; more cloudiness covers more."""
+    elevation, azimuth = angles(256)
+    elevation = elevation[:128]
+    lattice = np.random.default_rng(4).random((64, 64))
+    cover, _ = _clouds(lattice, elevation, azimuth, 0.5)
+    assert np.ptp(cover[0]) < 0.05 < np.ptp(cover[40])
+    assert cover[elevation < 0.02].max() < 0.13
+    assert np.abs(cover - cover[:, ::-1]).mean() > 0.1
+    means = [_clouds(lattice, elevation, azimuth, share)[0].mean() for share in (0.1, 0.4, 0.7, 1.0)]
+    assert (np.diff(means) > 0.05).all()
+
+
 def test_a_cloud_is_darker_where_it_is_thicker() -> None:
     """So an overcast sky is no even white: brighter where it is thin, and hardly coloured anywhere."""
+    elevation, azimuth = angles(512)
+    cover, thickness = _clouds(np.random.default_rng(4).random((64, 64)), elevation[:128], azimuth, 1.0)
+    green = panorama(Sky("procedural", ONE, seed=4, cloudiness=1.0))[:128, :, 1]
+    assert np.corrcoef(thickness[cover == 1], green[cover == 1])[0, 1] < -0.99
     picture = panorama(Sky("procedural", (1.0, 1.0, 1.0), seed=4, cloudiness=1.0))
     overhead = picture[: len(picture) // 4]
     grey = overhead[overhead[..., 2] < 1.5 * overhead[..., 0]] @ (0.2126, 0.7152, 0.0722)
@@ -610,6 +660,68 @@ def test_a_sky_of_a_file_is_read_and_scaled(tmp_path) -> None:
     picture = panorama(Sky(f"file:{path}", (1.0, 1.0, 1.0)))
     assert picture.shape == (16, 32, 3)
     np.testing.assert_allclose(picture[3, 3] / picture[3, 3, 0], (1.0, 0.5, 0.25), rtol=1e-5)
+
+
+def rle(channel: np.ndarray) -> bytes:
+    """A row of one channel, run-length coded as Ward's Radiance writes it: 128 + n, value or n, values."""
+    out, x = b"", 0
+    while x < len(channel):
+        stop = x + 1
+        while stop < min(len(channel), x + 127) and channel[stop] == channel[x]:
+            stop += 1
+        if stop > x + 2:
+            out += bytes([128 + stop - x, channel[x]])
+        else:
+            stop = x + min(128, len(channel) - x)  # the longest literal, of repetitions too
+            starts = [i for i in range(x + 1, stop - 3) if len(set(channel[i : i + 4])) == 1]
+            stop = starts[0] if starts else stop
+            out += bytes([stop - x]) + channel[x:stop].tobytes()
+        x = stop
+    return out
+
+
+def test_a_run_length_coded_sky_is_decoded(tmp_path) -> None:
+    """m 2^(e - 136) of every texel, none where e is 0; scaled to the mean luminance of the upper half."""
+    rng = np.random.default_rng(0)
+    rgbe = np.repeat(rng.integers(1, 256, (150, 100, 4)), 3, axis=1).astype(np.uint8)
+    rgbe[:, 60:] = rng.integers(1, 256, (150, 240, 4))
+    rgbe[::2, 100:] = 77  # longer than a run can be
+    rgbe[..., 3] = 120 + rgbe[..., 3] % 16
+    rgbe[5, 7:20, 3] = 0
+    rows = [b"\2\2" + (300).to_bytes(2) + b"".join(rle(row[:, i]) for i in range(4)) for row in rgbe]
+    assert len(b"".join(rows)) < 0.8 * rgbe.size
+    path = tmp_path / "sky.hdr"
+    path.write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 150 +X 300\n" + b"".join(rows))
+    found = panorama(Sky(f"file:{path}", (0.7, 0.7, 0.7)))
+    light = rgbe[:, ::-1, :3] * 2.0 ** (rgbe[:, ::-1, 3:].astype(float) - 136) * (rgbe[:, ::-1, 3:] > 0)
+    share = np.cos((np.arange(75) + 0.5) / 150 * np.pi - np.pi / 2)[:, None, None]
+    mean = (light[:75] * share).sum((0, 1)) @ (0.2126, 0.7152, 0.0722) / (share.sum() * 300)
+    np.testing.assert_allclose(found, 0.7 * light / mean, rtol=2e-3)
+
+
+@pytest.mark.parametrize("changed", ["time", "size"])
+def test_a_sky_that_was_changed_is_read_again(tmp_path, changed: str) -> None:
+    path = tmp_path / "sky.hdr"
+    found = []
+    for first, height in ((64, 16), (255, 16 if changed == "time" else 32)):
+        pixels = np.full((height, 2 * height, 4), (64, 64, 64, 129), np.uint8)
+        pixels[2, :, 0] = first
+        head = f"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {2 * height}\n"
+        path.write_bytes(head.encode() + pixels.tobytes())
+        os.utime(path, (1e9, 1e9 + 60 * (changed == "time") * len(found)))
+        found.append(panorama(Sky(f"file:{path}", ONE)))
+    assert found[0][2, 0, 0] < 1.1 < found[1][2, 0, 0]
+
+
+def test_a_sky_with_a_sun_gives_light_and_one_that_is_infinite_is_named(tmp_path) -> None:
+    light = np.ones((16, 32, 3), np.float32)
+    light[4, 3] = 1e4
+    write_exr(tmp_path / "sun.exr", light)
+    assert panorama(Sky(f"file:{tmp_path / 'sun.exr'}", ONE)).max() > 100
+    light[4, 3] = np.inf
+    write_exr(tmp_path / "sun.exr", light)
+    with pytest.raises(FsidError, match=r"sun\.exr: holds NaN or infinite values"):
+        panorama(Sky(f"file:{tmp_path / 'sun.exr'}", ONE))
 
 
 def test_a_large_sky_is_averaged_and_read_once(tmp_path, monkeypatch) -> None:
