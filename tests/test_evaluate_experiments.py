@@ -24,9 +24,17 @@ from fsid.errors import FsidError
 from fsid.evaluate.compare import NOISY, Method, summarise
 from fsid.evaluate.dead_leaves import RADIUS_PX, dead_leaves_rand, write_dead_leaves
 from fsid.evaluate.demo import ISOS, DemoConfig, _copy_photographs
-from fsid.evaluate.experiment_config import PHOTOGRAPHS, SOURCES, scale_config
+from fsid.evaluate.experiment_config import DEAD_LEAVES, PHOTOGRAPHS, SCENES, SOURCES, scale_config
 from fsid.evaluate.experiment_report import gaps, write_experiment_report
-from fsid.evaluate.experiments import TEST_ISOS, _data, _testsets, _training
+from fsid.evaluate.experiments import (
+    TEST_ISOS,
+    _data,
+    _generator,
+    _measured,
+    _testsets,
+    _training,
+    experiment,
+)
 from fsid.evaluate.plots import loss_plot
 from fsid.evaluate.results import ImageRow, read_images, write_images
 from fsid.evaluate.resumable_folder import claimed
@@ -203,6 +211,103 @@ def test_networks_are_trained_on_the_noise_that_they_are_tested_on():
     assert training.iso_max >= max(isos)
     chosen = replace(config, train_settings=("iso_max=3200",))
     assert _training(chosen, 0).iso_max == 3200
+
+
+def test_a_training_is_that_of_its_seed_and_of_the_settings_that_were_given():
+    """Steps that are given are those of all trainings."""
+    config = replace(scale_config("ablation", "cpu"), steps=7, train_settings=("steps=9", "batch=3"))
+    found = _training(config, 11)
+    assert (found.steps, found.batch, found.seed) == (7, 3, 11)
+    usual = _training(replace(config, steps=0, train_settings=()), 12)
+    assert found == replace(usual, steps=7, batch=3, seed=11)
+    assert usual.seed == 12
+
+
+def test_rivals_are_made_of_their_own_settings_and_of_one_camera(photos: Path, tmp_path: Path):
+    """Settings of scenes are those of every variant; frames of photographs are 1024 pixels at least."""
+    config = replace(
+        scale_config("real-vs-synthetic", "smoke"),
+        **{"photos": str(photos), "camera": "galaxy-s22", "settings": ("scene.objects=[3,4]",)},
+        **{"width": 1200, "height": 640},
+    )
+    found = {
+        name: _generator(tmp_path, config, name) for name in (*SOURCES["ablation"], *SOURCES[config.kind])
+    }
+    assert set(found) == {"objects", "materials", "objects-materials", "full", "photographs", "dead-leaves"}
+    for name, made in found.items():
+        assert made.cameras == ("galaxy-s22",)
+        assert (made.width, made.height) == (1200, 1024 if name == PHOTOGRAPHS else 640)
+        if name in SOURCES["ablation"]:
+            assert (made.variant, made.scene.objects, made.images) == (name, (3, 4), "")
+    assert found[PHOTOGRAPHS].images == str(photos)
+    assert found[DEAD_LEAVES].images == str(tmp_path / "dead-leaves")
+
+
+def test_every_source_is_trained_on_with_every_seed_and_made_with_the_first(
+    photos: Path, tmp_path: Path, monkeypatch
+):
+    """Of photographs as many pairs as there are, if that is more; nothing here is rendered or trained."""
+    module, calls = "fsid.evaluate.experiments", []
+    config = replace(scale_config("real-vs-synthetic", "smoke"), photos=str(photos), count=2, seeds=(5, 8))
+
+    def recorded(name):
+        return lambda *given, **options: calls.append((name, given, options))
+
+    def measured(stem, methods, testsets, bar):
+        rows = [(stem.parent.name, stem.name, method.name, method.training) for method in methods]
+        return rows, [stem.name]
+
+    for name in ("generate", "train", "write_dead_leaves", "write_results", "write_images"):
+        monkeypatch.setattr(f"{module}.{name}", recorded(name))
+    monkeypatch.setattr(f"{module}._testsets", lambda out, config, bar: [])
+    monkeypatch.setattr(f"{module}._measured", measured)
+    monkeypatch.setattr(f"{module}.model_method", lambda run, name: Method(name, "", NOISY.denoise))
+    monkeypatch.setattr(f"{module}.write_experiment_report", lambda path, config, pairs, *rest: (path, pairs))
+    out = tmp_path / "out"
+    report, pairs = experiment(out, config, workers=3)
+    assert report == out / "report.html"
+    assert pairs == {PHOTOGRAPHS: 3, SCENES: 2, DEAD_LEAVES: 2}
+    order = [(source, seed) for source in SOURCES[config.kind] for seed in config.seeds]
+    trained = [given for name, given, _ in calls if name == "train"]
+    assert [(data, run, settings.seed) for data, run, settings in trained] == [
+        (out / "data" / source, out / "runs" / f"{source}-seed{seed}", seed) for source, seed in order
+    ]
+    made = [(*given, options) for name, given, options in calls if name == "generate"]
+    assert [(data, each["count"], each["seed"], each["workers"]) for data, _, each in made] == [
+        (out / "data" / source, pairs[source], 5, 3) for source, _ in order
+    ]
+    drawn = [(*given, options) for name, given, options in calls if name == "write_dead_leaves"]
+    assert {(path, count, each["width"], each["height"], each["seed"]) for path, count, each in drawn} == {
+        (out / "dead-leaves", 2, 128, 96, 5)
+    }
+    ((rows, written),) = [given for name, given, _ in calls if name == "write_results"]
+    assert written == out / "results.json"
+    assert [row[:3] for row in rows[:2]] == [("out", "baselines", name) for name in ("noisy", "classical")]
+    assert rows[2:] == [
+        ("measured", f"{source}-seed{seed}", f"{source}-seed{seed}", f"{pairs[source]} pairs from {source}")
+        for source, seed in order
+    ]
+
+
+def test_figures_that_lack_an_image_are_not_taken_for_all(tmp_path: Path, monkeypatch):
+    """An image of another set, or of another level, is not the one that is missing."""
+    testset = TestSet("pixel6", ("iso800", "iso1600"), (TestImage("i", "a"), TestImage("j", "b")), 0, "")
+    monkeypatch.setattr("fsid.evaluate.experiments.read_testset", lambda path: testset)
+    method = Method("m", "", NOISY.denoise)
+    images = [
+        ImageRow("m", level, each.set, each.name, 40.0 + len(each.name), value, 0.9)
+        for each in testset.images
+        for level, value in (("iso800", 30.0), ("iso1600", 20.0))
+    ]
+    write_images(images, tmp_path / "m.csv")
+    rows, found = _measured(tmp_path / "m", [method], [tmp_path], partial(progress_bar, quiet=True))
+    assert found == images
+    assert {(row.level, row.psnr) for row in rows} == {("iso800", 30.0), ("iso1600", 20.0)}
+    for lacking in images:
+        others = [row for row in images if row != lacking]
+        write_images([*others, replace(lacking, set="c")], tmp_path / "m.csv")
+        with pytest.raises(FsidError, match=rf"m\.csv: lacks {lacking.image} at {lacking.level}; delete it"):
+            _measured(tmp_path / "m", [method], [tmp_path], partial(progress_bar, quiet=True))
 
 
 def test_sources_of_all_sizes_are_trained_on_alike(tmp_path: Path):
