@@ -8,9 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fsid.cli.calibrate import _table
 from fsid.cli.main import main
 from fsid.errors import FsidError
 from fsid.sensor import (
+    Calibration,
     Layout,
     NoiseTerms,
     Raw,
@@ -224,6 +226,53 @@ def test_the_name_of_a_camera_is_printed_as_it_is(tmp_path, rng, capsys):
     out = capsys.readouterr().out
     assert name in out
     assert source in out
+
+
+def test_every_option_of_the_command_is_what_calibration_is_asked_for(tmp_path, monkeypatch):
+    asked = []
+
+    def calibrated(frames, **options):
+        asked.append((frames, options))
+        raise FsidError("no more of this is needed")
+
+    monkeypatch.setattr("fsid.sensor.calibrate", calibrated)
+    lit, dark = write_dn(tmp_path / "a.npy", np.zeros((4, 4))), write_dn(tmp_path / "b.npy", np.ones((4, 4)))
+    command = f"calibrate {lit} -o {tmp_path}/mine.yaml --quiet"
+    given = f"--dark {dark} --iso 200 --cfa GRBG --black-level 60,66,64,70 --white-level 1023 --width 8"
+    for more in ("", f"{given} --height 6 --camera Mine --tie-greens --terms"):
+        with pytest.raises(SystemExit):
+            main([*command.split(), *more.split()])
+    for _, options in asked:
+        del options["progress"]
+    usual = {
+        "name": "mine",
+        "dark": (),
+        "layout": Layout(),
+        "camera": None,
+        "tie_greens": False,
+        "terms": False,
+    }
+    layout = Layout(200.0, "GRBG", (60, 66, 64, 70), 1023, 8, 6)
+    chosen = {"dark": (dark,), "layout": layout, "camera": "Mine", "tie_greens": True, "terms": True}
+    assert asked == [((lit,), usual), ((lit,), usual | chosen)]
+
+
+@pytest.mark.parametrize(("sites", "labels"), [(4, ["R", "Gr", "Gb", "B"]), (1, ["mono"])])
+def test_the_table_of_a_calibration_has_each_figure_in_its_place(sites, labels):
+    rows = np.arange(10.0).reshape(2, 5)[..., None] + np.arange(1, sites + 1) / 100 + 1
+    profile = replace(
+        PROFILE, iso=(200.0, 400.0), k=PROFILE.k[:2], sigma2=PROFILE.sigma2[:2], camera="[Mine]"
+    )
+    fits = tuple(NoiseFit(*row, samples=()) for row in rows)
+    table = _table(Calibration(profile, fits, ()))
+    assert str(table.title) == "[Mine]"
+    cells = list(zip(*(column.cells for column in table.columns), strict=True))
+    # k, sigma2 and their errors come first in a fit, the black level last
+    assert cells == [
+        (f"{iso}", label, f"{r[4, i]:.2f}", *(f"{r[at, i]:.4g}" for at in (0, 2, 1, 3)))
+        for iso, r in zip((200, 400), rows, strict=True)
+        for i, label in enumerate(labels)
+    ]
 
 
 def test_read_noise_that_reaches_zero_is_said_and_still_found(tmp_path, rng):
