@@ -14,10 +14,11 @@ import fsid.render.sky
 from fsid.assets import Mesh, survey_skies
 from fsid.errors import FsidError
 from fsid.render import Renderer
-from fsid.render.drawable import Drawable, background_drawable, panel_drawable, view_of
+from fsid.render.drawable import BACKGROUND_ID, Drawable, background_drawable, panel_drawable, view_of
 from fsid.render.lamps import hoods_apart, lamps_of
-from fsid.render.room import light_sky
+from fsid.render.room import light_room, light_sky
 from fsid.render.sky import _clouds, _lattice, angles, panorama
+from fsid.render.sky_sun import part_sun
 from fsid.scene import SceneConfig, sample
 from fsid.scene.model import ZERO, Background, Camera, Light, Sky, Transform, Vec3
 from render_scenes import (
@@ -882,6 +883,136 @@ def test_the_sun_in_a_picture_of_the_sky_is_a_sun(renderer: Renderer) -> None:
     assert (np.abs(found - expected)[~mirrored] < 0.01 * bright).mean() > 0.995  # all but outlines of shadows
     assert expected[mirrored].max() > 20 * bright
     np.testing.assert_allclose(found[mirrored].sum(), expected[mirrored].sum(), rtol=0.03)
+
+
+TO_SUN = np.array((0.48, 0.6, 0.64))
+
+
+def sky_of(*places: tuple[np.ndarray, float, Vec3]) -> tuple[np.ndarray, list[np.ndarray]]:
+    """A grey sky with even discs: towards, radius and irradiance; and where each is (H, 2 H)."""
+    elevation, azimuth = angles(512)
+    up, around = np.meshgrid(elevation, azimuth, indexing="ij")
+    towards = np.stack([np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)], -1)
+    picture, discs = np.full((512, 1024, 3), 0.2), []
+    for place, radius, irradiance in places:
+        discs.append(towards @ place > np.cos(radius))
+        size = (discs[-1] * np.cos(up)).sum() * (np.pi / 512) ** 2
+        picture[discs[-1]] += np.array(irradiance) / size
+    return picture.astype(np.float32), discs
+
+
+def test_what_is_brighter_than_ten_times_the_mean_around_the_brightest_place_is_the_sun() -> None:
+    """Its excess is the light's, in its direction and of its size; all else stays in the sky: what is 10
+    degrees beside it, what is below the horizon, and what is left of it."""
+    beside = np.array((0.48, 0.4, 0.64)) / np.linalg.norm((0.48, 0.4, 0.64))
+    below = np.array((0.6, 0.0, -0.8))
+    picture, discs = sky_of(
+        (TO_SUN, 0.03, (3.0, 2.0, 0.0)), (beside, 0.02, (0.3,) * 3), (below, 0.03, (9.0,) * 3)
+    )
+    before = picture.copy()
+    light, rest = part_sun(picture)
+    np.testing.assert_array_equal(picture, before)
+    assert light is not None
+    most = 10 * picture.mean()
+    size = np.pi * 0.03**2
+    np.testing.assert_allclose(light.colour, (3 + (0.2 - most) * size, 2 + (0.2 - most) * size, 0), atol=0.02)
+    np.testing.assert_allclose(light.direction, -TO_SUN, atol=1e-3)
+    assert np.linalg.norm(light.direction) == pytest.approx(1)
+    assert light.radius_m == pytest.approx(0.03, rel=0.03)
+    sun_disc, *others = discs
+    np.testing.assert_allclose(rest[sun_disc], np.minimum(picture[sun_disc], most), rtol=1e-5)
+    np.testing.assert_array_equal(rest[~sun_disc], picture[~sun_disc])
+    assert all((picture[disc] > most).any() for disc in others)
+
+
+@pytest.mark.parametrize(
+    ("radius", "irradiance", "is_sun"), [(0.02, 0.1, True), (0.006, 0.02, False), (0.5, 0.7, False)]
+)
+def test_neither_a_star_nor_a_bright_cloud_is_a_sun(radius: float, irradiance: float, is_sun: bool) -> None:
+    """A light is worth a shadow from a twentieth of pi times the mean on, 0.03 here, and if it is 10 times
+    as bright as the mean."""
+    picture, _ = sky_of((TO_SUN, radius, (irradiance,) * 3))
+    light, rest = part_sun(picture)
+    assert (light is not None) == is_sun
+    assert is_sun or rest is picture
+
+
+def test_walls_shine_as_they_are_lit() -> None:
+    """Albedo times (E / pi + ambient), and their own light, at the middles of 16 x 16 cells of each side; the
+    sun comes through no wall."""
+    size, floor_m, ambient = np.array([3.0, 4.0, 2.5]), -0.75, np.array([0.1, 0.2, 0.3])
+    albedo = np.linspace(0.1, 0.8, 18).reshape(6, 3)
+    glow = np.linspace(0.5, 0.0, 18).reshape(6, 3)
+    bulb = Light("point", (0.4, -0.7, 0.9), (0.0, 0.0, -1.0), (2.0, 3.0, 4.0), 0.05, 360.0)
+    lamp = panel((-0.5, 0.6, 1.2), (0.0, -0.6, -0.8), (0.4, 0.3), 5.0)
+    room = light_room(tuple(size), floor_m, albedo, glow, (bulb, lamp, sun((0.0, 0.0, -1.0))), tuple(ambient))
+    t = (np.arange(16) + 0.5) / 16 - 0.5
+    ahead = np.array(lamp.direction)
+    for side in range(6):
+        axis, sign = side // 2, 1 - 2 * (side % 2)
+        points = np.zeros((16, 16, 3))
+        points[..., axis] = sign / 2
+        points[..., (axis + 1) % 3] = t
+        points[..., (axis + 2) % 3] = t[:, None]
+        points = points * size + (0, 0, floor_m + size[2] / 2)
+        total = np.zeros((16, 16, 3))
+        for light in (bulb, lamp):
+            to = np.array(light.position_m) - points
+            distance = np.linalg.norm(to, axis=-1)
+            share = np.maximum(-sign * to[..., axis] / distance, 0)
+            if light is lamp:
+                share *= 0.12 * np.maximum(-to @ ahead / distance, 0) / (distance**2 + 0.12 / np.pi)
+            else:
+                share /= distance**2
+            total += share[..., None] * light.colour
+        np.testing.assert_allclose(room.radiance[side], albedo[side] * (total / np.pi + ambient) + glow[side])
+
+
+def test_ambient_light_of_a_room_is_as_stated_on_average_and_what_its_walls_give_besides() -> None:
+    """Alike from all sides where these are, by what is on each where not, and more from a near floor."""
+    size, ambient = (3.0, 4.0, 2.5), (0.1, 0.2, 0.3)
+    none, grey, luminance = np.zeros((6, 3)), np.full((6, 3), 0.4), np.array((0.2126, 0.7152, 0.0722))
+    np.testing.assert_allclose(light_room(size, 0.0, grey, none, (), ambient).ambient, [ambient] * 6)
+    np.testing.assert_allclose(light_room(size, 0.0, none, grey, (), ambient).ambient, np.add(ambient, grey))
+    uneven = np.linspace(0.1, 0.8, 6)[:, None] * np.ones(3)
+    found = light_room(size, 0.0, uneven, none, (), ambient).ambient
+    assert (found @ luminance).mean() == pytest.approx(np.dot(ambient, luminance))
+    for even in (0, 2, 4):
+        assert found[even, 0] < found[even + 1, 0]  # towards the darker side and the lighter one
+    shining = {side: np.arange(6)[:, None] == [[side] * 3] for side in (4, 5)}  # ceiling, floor
+    sideways = {
+        side: light_room(size, 0.0, none, 1.0 * glow, (), (0.0,) * 3).ambient[:4].mean()
+        for side, glow in shining.items()
+    }
+    assert sideways[5] > 1.5 * sideways[4] > 0
+
+
+def test_the_twelve_strongest_lamps_shine_strongest_first() -> None:
+    """Of radiance L and surface A the intensity L A / 4, at the middle, as large as it is, all around alike;
+    what shines of the background is none of them."""
+    strength = [3.0, 14.0, 1.0, 9.0, 4.0, 12.0, 7.0, 2.0, 11.0, 5.0, 8.0, 10.0, 6.0, 13.0]
+    ball = moved(sphere(0.1, 24), (0.0, 0.0, 0.5))
+    lamps = [
+        Drawable(
+            ball,
+            Transform((float(i), 0.0, 1.0), (90.0, 0.0, 0.0), (2.0, 2.0, 2.0)),
+            (replace(plain((0.8, 0.4, 0.2)), emission=emission),),
+            i if emission < 14 else BACKGROUND_ID,
+        )
+        for i, emission in enumerate(strength)
+    ]
+    found = lamps_of(hoods_apart(lamps), lambda material: np.array(material.colours[0]), 0.0)
+    wanted = sorted((emission for emission in strength if emission < 14), reverse=True)[:12]
+    area = 4 * np.pi * 0.2**2
+    for source, emission in zip(found, wanted, strict=True):
+        light, i = source.light, strength.index(emission)
+        rotation, position = lamps[i].pose(0.0)
+        assert source.lamp == i
+        assert light.kind == "point"
+        np.testing.assert_allclose(light.position_m, rotation @ (0, 0, 1.0) + position, atol=1e-3)
+        np.testing.assert_allclose(light.colour, np.array((0.8, 0.4, 0.2)) * emission * area / 4, rtol=0.02)
+        assert light.radius_m == pytest.approx(0.2, rel=0.01)
+        np.testing.assert_allclose(source.shape, np.eye(3), atol=0.03)
 
 
 def test_a_sky_turns_from_x_towards_y(tmp_path) -> None:
