@@ -138,6 +138,7 @@ def test_a_smaller_count_in_between_leaves_nothing_unfinished(photos: Path, tmp_
     generate(tmp_path, config, count=6, shard_size=2)
     card = (tmp_path / "README.md").read_text()
     assert "6 pairs for denoise" in card
+    assert "`k` and `sigma2` of its JSON, of R, Gr (in rows with R), Gb and B" in card
     (tmp_path / "README.md").unlink()
     for count in (2, 6):
         assert generate(tmp_path, config, count=count, shard_size=2) == 0

@@ -135,6 +135,9 @@ def _text(dataset: DatasetConfig, tally: _Tally, statistics: Sequence[str], comm
         f"(fsid {__version__}, seed {dataset.seed}). "
         "WebDataset shards; `config.yaml` has every setting, each pair's JSON all that makes it again.",
         "",
+        "Noise of a pair: `Var(x) = k x + sigma2` with `k` and `sigma2` of its JSON, of R, Gr (in rows with "
+        "R), Gb and B; x = (DN - black) / (white - black) with the levels that a DNG states.",
+        "",
         f"![Some of the clean images, developed]({SHEET})",
         "",
         "| | |",
