@@ -133,8 +133,7 @@ def identity(data_dir: Path) -> str:
     file = data_dir / DATASET_FILE
     if file.exists():
         return hashlib.sha256(read_whole(file)).hexdigest()
-    first = next(m for shard in find_shards(data_dir) for m in _index_shard(shard, ".clean.dng"))
-    return hashlib.sha256(first.levels().tobytes()).hexdigest()
+    return hashlib.sha256(index_mosaics(data_dir)[0].levels().tobytes()).hexdigest()
 
 
 def task_of(data_dir: Path) -> str:
