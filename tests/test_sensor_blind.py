@@ -52,6 +52,16 @@ def test_the_noise_of_a_photo_is_found(name, iso, rng):
     assert np.all(np.abs(np.array(found.level.sigma2) - level.sigma2) < 4 * np.array(found.sigma2_error))
 
 
+@pytest.mark.parametrize("black", [0, 8])
+def test_noise_that_is_cut_off_at_dn_0_is_found(black, rng):
+    """At black half of it is where black is DN 0; as it is stored, it varies by a third."""
+    level = NoiseLevel((4e-3,) * 4, (4e-4,) * 4)
+    clean = replace(scene(ramp(512, 512) / 4), black_level=black)
+    found = estimate_noise(noisy_from_clean(rng, clean, 12800, level))
+    np.testing.assert_allclose(found.level.sigma2, level.sigma2, rtol=0.15)
+    np.testing.assert_allclose(found.level.k, level.k, rtol=0.15)
+
+
 @pytest.mark.parametrize("cfa", CFA_PATTERNS)
 def test_sites_that_differ_are_told_apart(cfa):
     """Without texture the estimate is unbiased, and its scatter is below the stated error."""

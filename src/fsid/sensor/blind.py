@@ -9,6 +9,9 @@ block is smooth where its low frequencies hold no more energy than its noise alo
 noise is known better after each round. Blocks of like mean are pooled by their median, and pools above the
 line count less than those below it: texture that was missed only ever adds.
 
+Where noise reaches DN 0 it is cut off there, and all of it where black is stored as 0: mean and variance of a
+pool are then taken back to those before (`stored_noise`), and it counts less the more was cut off.
+
 A picture rarely shows every colour in every light, so a site that says little is drawn to the mean of all
 four, from which the sites of published phones differ by `SITE_SPREAD`. Where hardly any block is smooth, the
 smoothest are taken. Texture as fine and random as noise (grain, gravel, grass) cannot be told from it.
@@ -28,6 +31,7 @@ from fsid.errors import FsidError
 from fsid.sensor.mosaic import site_offsets
 from fsid.sensor.quantise import ROUNDING_DN2
 from fsid.sensor.raw import NoiseLevel, Raw, four
+from fsid.sensor.stored_noise import censored
 
 UNLIKE = 4.0  # times a variance: two stops of ISO, beyond what texture makes in photographs
 SITE_SPREAD = (0.1, 0.3)  # relative, of k and sigma2: twelve published phones
@@ -96,13 +100,15 @@ def _in_light(k: Sequence[float], sigma2: Sequence[float], light: Sequence[float
 class _Blocks:
     """Blocks of one site: mean, energy of low frequencies and of high ones, each per coefficient.
 
-    share: of a block that no other block holds too; blocks overlap where there are few.
+    share: of a block that no other block holds too; blocks overlap where there are few. lowest: x of DN 0,
+    where noise is cut off; -infinity where it does not reach it.
     """
 
     mean: np.ndarray
     low: np.ndarray
     high: np.ndarray
     share: float
+    lowest: float = -np.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,6 +124,11 @@ _ORDER = np.add.outer(np.arange(_SIDE), np.arange(_SIDE))
 _LOW, _HIGH = (_ORDER > 0) & (_ORDER < _SIDE), _ORDER >= _SIDE + 2
 _LOW_LIMIT = 2 * gammaincinv(_LOW.sum() / 2, _SMOOTH_QUANTILE) / _LOW.sum()  # chi2 quantiles per degree of
 _HIGH_MEDIAN = 2 * gammaincinv(_HIGH.sum() / 2, 0.5) / _HIGH.sum()  # freedom; scipy.stats is slow to import
+_NEAR_0 = 0.75  # of the way from black to DN 0, beyond which the least value is taken for DN 0
+_SEEN = 6  # power of the share that DN 0 leaves, in the weight of a pool (17 photographs: 2 and 6 tried)
+_SIGMAS = np.linspace(-0.5, 5, 276)  # of light above DN 0; none is below, but for chance
+_SHIFT, _LEFT, _CUT = censored(-_SIGMAS, np.full_like(_SIGMAS, 1e9))  # of noise that ends at DN 0 alone
+_TINY = 1e-9
 _MEDIAN_EFFICIENCY = 2 / np.pi  # of the median against the mean
 
 
@@ -127,12 +138,16 @@ def estimate_noise(raw: Raw) -> NoiseEstimate:
     sigma2 is never below the rounding noise of the camera's integers. Fixed pattern noise counts as noise.
     FsidError: an image without smooth parts, saturated or without noise: nothing to measure.
     """
-    blocks = [_blocks(raw.mosaic[r::2, c::2]) for r, c in site_offsets(raw.cfa)]
-    floor = ROUNDING_DN2 / (raw.white_level - raw.black_level) ** 2
+    span = raw.white_level - raw.black_level
+    near_0 = (1 - _NEAR_0 * raw.black_level) / span
+    blocks = [_blocks(raw.mosaic[r::2, c::2], near_0) for r, c in site_offsets(raw.cfa)]
+    floor = ROUNDING_DN2 / span**2
     mean, low, high = (np.concatenate([getattr(b, n) for b in blocks]) for n in ("mean", "low", "high"))
-    together = _Blocks(mean, low, high, blocks[0].share)
+    together = _Blocks(mean, low, high, blocks[0].share, max(b.lowest for b in blocks))
     if together.mean.size < _MIN_BLOCKS:
-        raise FsidError("the image is too small, or saturated almost everywhere, to tell its noise")
+        raise FsidError(
+            "the image is too small, or saturated or at DN 0 almost everywhere, to tell its noise"
+        )
     line = _first_line(together, floor)
     for _ in range(_ROUNDS):
         pools = _pools(together, line)
@@ -149,8 +164,11 @@ def estimate_noise(raw: Raw) -> NoiseEstimate:
     return NoiseEstimate(NoiseLevel(four(k), four(sigma2)), four(k_error), four(sigma2_error))
 
 
-def _blocks(plane: np.ndarray) -> _Blocks:
-    """Blocks of `plane` (h, w) in an even grid, overlapping where there are few; without saturated ones."""
+def _blocks(plane: np.ndarray, near_0: float) -> _Blocks:
+    """Blocks of `plane` (h, w) in an even grid, overlapping where there are few; without saturated ones.
+
+    near_0: x below which the least value is that of DN 0; where that lies, sites differ in a little.
+    """
     height, width = plane.shape
     step = _SIDE
     while step > 2 and (height // step) * (width // step) < _MAX_BLOCKS:
@@ -163,10 +181,12 @@ def _blocks(plane: np.ndarray) -> _Blocks:
     tiles = tiles.reshape(-1, _SIDE, _SIDE)
     tiles = tiles[:: max(1, len(tiles) // _MAX_BLOCKS)]
     tiles = tiles[tiles.max(axis=(1, 2)) < LINEAR_SHARE]
+    least = float(plane.min())
+    lowest = least if least < near_0 else -np.inf
+    tiles = tiles[tiles.max(axis=(1, 2)) > lowest]  # what is all DN 0 shows no noise
     energy = dctn(tiles, axes=(1, 2), norm="ortho") ** 2
-    return _Blocks(
-        tiles.mean(axis=(1, 2)), energy[:, _LOW].mean(axis=1), energy[:, _HIGH].mean(axis=1), share
-    )
+    low, high = (energy[:, part].mean(axis=1) for part in (_LOW, _HIGH))
+    return _Blocks(tiles.mean(axis=(1, 2)), low, high, share, lowest)
 
 
 def _first_line(blocks: _Blocks, floor: float) -> np.ndarray:
@@ -185,6 +205,7 @@ def _first_line(blocks: _Blocks, floor: float) -> np.ndarray:
 
 def _pools(blocks: _Blocks, line: np.ndarray) -> _Pools:
     expected = line[0] * blocks.mean.clip(min=0) + line[1]
+    expected *= _left((blocks.mean - blocks.lowest) / np.sqrt(expected))
     roughness = blocks.low / expected
     enough = np.partition(roughness, _MIN_SMOOTH)[_MIN_SMOOTH] if roughness.size > _MIN_SMOOTH else np.inf
     smooth = np.flatnonzero(roughness <= max(_LOW_LIMIT, min(enough, _ROUGHEST)))
@@ -196,7 +217,24 @@ def _pools(blocks: _Blocks, line: np.ndarray) -> _Pools:
         [np.median(blocks.high[part] / expected[part]) * expected[part].mean() for part in parts]
     )
     freedom = np.array([part.size * blocks.share * _HIGH.sum() * _MEDIAN_EFFICIENCY for part in parts])
-    return _Pools(mean, variance / _HIGH_MEDIAN, freedom)
+    light, noise, seen = _before_cut_off(mean, variance / _HIGH_MEDIAN, blocks.lowest)
+    return _Pools(light, noise, freedom * seen**_SEEN)
+
+
+def _left(sigmas: np.ndarray) -> np.ndarray:
+    """(n,) share of its variance that noise keeps whose mean DN 0 leaves so many sigmas above itself."""
+    return np.interp(sigmas, _SIGMAS + _SHIFT, _LEFT)
+
+
+def _before_cut_off(
+    mean: np.ndarray, variance: np.ndarray, lowest: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Light, variance and the share that is not cut off, from mean and variance of what is stored; (n,)."""
+    ratio = variance / np.maximum(mean - lowest, _TINY) ** 2
+    sigmas = np.interp(-ratio, -_LEFT / (_SIGMAS + _SHIFT) ** 2, _SIGMAS)
+    shift, left, cut = (np.interp(sigmas, _SIGMAS, values) for values in (_SHIFT, _LEFT, _CUT))
+    noise = variance / left
+    return mean - shift * np.sqrt(noise), noise, 1 - cut
 
 
 def _line(pools: _Pools, floor: float) -> tuple[np.ndarray, np.ndarray]:

@@ -71,7 +71,7 @@ def before_clipping(
     reached = np.minimum(mean - lowest, highest - mean) < _REACH * np.sqrt(tau2)
     for _ in range(_INVERSIONS if reached.any() else 0):
         below, above = ((limit - mu) / np.sqrt(tau2) for limit in (lowest, highest))
-        shift, left, share = _censored(below, above)
+        shift, left, share = censored(below, above)
         mu = np.where(reached, mean - shift * np.sqrt(tau2), mu)
         tau2 = np.where(reached, variance / np.maximum(left, 1e-3), tau2)
     return mu, tau2, share
@@ -96,7 +96,7 @@ def dark_noise(means: np.ndarray, variances: np.ndarray, frames: int, white_leve
     return _solved(np.array([mean, variance, fixed2]), errors, white_level)
 
 
-def _censored(below: np.ndarray, above: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def censored(below: np.ndarray, above: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Mean and variance of a normal number clipped to below..above, and the share that is clipped."""
     p, q = ndtr(below), ndtr(-above)
     f, g = (np.exp(-z * z / 2) / np.sqrt(2 * np.pi) for z in (below, above))
