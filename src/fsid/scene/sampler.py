@@ -74,7 +74,8 @@ def sample(
     streams, fixed = _streams(seed), _streams(_FIXED_SEED)
     B, mood = background_rand(np.random.default_rng(streams.B), config)
     space, outdoors = space_of(B), B.kind == "open-air"
-    view, focus = camera_rand(np.random.default_rng(streams.camera), config.camera, B, width, height)
+    low, rng = variant != "full", np.random.default_rng(streams.camera)
+    view, focus = camera_rand(rng, config.camera, B, width, height, low=low)
     cameras = _cameras_rand(streams, config, view, B)
     sky_source = sky_rand(np.random.default_rng(streams.sky), config) if outdoors else None
     lighting = lighting_rand(

@@ -27,6 +27,8 @@ LOW_VIEW_DEG, LOW_VIEW_M = 20.0, 1.25
 """Below this elevation a camera keeps this distance: the fixed arrangement of v1-v3 ends before it."""
 SKYWARD_ELEVATION = 0.2
 """Views that look up are taken from so many times the elevation that was drawn."""
+FOCUS_SEEN = 0.8
+"""Of a low arrangement the focus is at most so many half heights below the middle: 1 is the lower edge."""
 EYE_SLACK_M = 0.15
 """The eyes of a rig may be so much nearer to walls, and a third of it to the ground, than the drawn view."""
 
@@ -41,10 +43,13 @@ def camera_rand(
     background: Background,
     width: int,
     height: int,
+    *,
+    low: bool = False,
 ) -> tuple[Camera, np.ndarray]:
     """A camera inside a background, and the focus (3,) in metres, which it looks at, or above it at the sky.
 
-    One that stands in the hills stands as much higher as they are there.
+    One that stands in the hills stands as much higher as they are there. low: nothing rises above the focus,
+    so that it stays in the picture.
     """
     space, outdoors = space_of(background), background.kind == "open-air"
     sky_rng = rng.spawn(1)[0]
@@ -63,8 +68,12 @@ def camera_rand(
     roll, fov_deg = np.radians(rng.normal(0, config.roll_deg)), float(rng.uniform(*config.fov_deg))
     if skyward:
         ahead = target - position
-        rise = horizon * np.tan(np.radians(fov_deg / 2)) * height / width
-        ahead[2] = rise * np.hypot(ahead[0], ahead[1])
+        half = np.tan(np.radians(fov_deg / 2)) * height / width
+        slope = horizon * half
+        if low:
+            to_focus = focus - position
+            slope = min(slope, to_focus[2] / np.hypot(to_focus[0], to_focus[1]) + FOCUS_SEEN * half)
+        ahead[2] = slope * np.hypot(ahead[0], ahead[1])
         target = position + ahead
     forward = (target - position) / np.linalg.norm(target - position)
     right = np.cross(forward, (0.0, 0.0, 1.0))
