@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import hypothesis
 import numpy as np
 import pytest
 from PIL import Image
@@ -15,6 +16,9 @@ if TYPE_CHECKING:
     from fsid.render import Renderer
 
 REPOSITORY = Path(__file__).resolve().parents[1]
+
+hypothesis.settings.register_profile("fsid", deadline=None)  # how long a case takes is the machine's affair
+hypothesis.settings.load_profile("fsid")
 
 
 @pytest.fixture(scope="session")

@@ -7,7 +7,7 @@ import pytest
 
 torch = pytest.importorskip("torch")
 
-from hypothesis import given, settings  # noqa: E402
+from hypothesis import given  # noqa: E402
 from hypothesis import strategies as st  # noqa: E402
 
 from fsid.denoise.conditioning import (  # noqa: E402
@@ -26,7 +26,6 @@ def full(value: float) -> torch.Tensor:
     return torch.full((1, 4, 1, 1), value, dtype=torch.double)
 
 
-@settings(deadline=None)
 @given(k=gains, sigma2=st.floats(0, 1e-2), x=st.lists(st.floats(-0.3, 1.5), min_size=1, max_size=8))
 def test_round_trip_and_order(k: float, sigma2: float, x: list[float]) -> None:
     image = torch.tensor(sorted(x), dtype=torch.double).expand(1, 4, 1, len(x))
@@ -35,7 +34,6 @@ def test_round_trip_and_order(k: float, sigma2: float, x: list[float]) -> None:
     assert (y.diff(dim=-1) >= 0).all()
 
 
-@settings(deadline=None)
 @given(sigma2=st.floats(1e-6, 1e-2), x=st.floats(-0.3, 1.5))
 def test_without_shot_noise_it_is_a_division_by_sigma(sigma2: float, x: float) -> None:
     y = stabilise(full(x), full(0.0), full(sigma2))

@@ -17,7 +17,7 @@ from fsid.scene.model import Sky
 FEW = SceneConfig(objects=(2, 4))
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.integers(0, 2**63), st.sampled_from(VARIANTS))
 def test_round_trip_is_exact(seed, variant):
     scene = sample(FEW, seed, width=64, height=48, variant=variant)

@@ -97,7 +97,7 @@ def test_demosaic_reproduces_a_colour_gradient_away_from_the_border(cfa):
     np.testing.assert_allclose(demosaic(mosaic(image, cfa), cfa)[inside], image[inside], atol=1e-5)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.sampled_from(CFA_PATTERNS), st.floats(0.01, 0.99), st.integers(0, 2**32 - 1))
 def test_grey_is_grey(cfa, light, seed):
     matrix, gains = colour_rand(np.random.default_rng(seed), published_matrices())

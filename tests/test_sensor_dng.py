@@ -641,7 +641,7 @@ def test_pixels_that_libraw_would_look_for_elsewhere_are_refused(tmp_path, kind,
             read_raw(path)
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(st.tuples(st.integers(0, 819), st.integers(0, 255)), min_size=1, max_size=4))
 def test_mutated_headers_end_with_an_image_or_one_line(tmp_path, changes):
     buffer = io.BytesIO()
