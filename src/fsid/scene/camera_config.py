@@ -26,7 +26,8 @@ class CameraConfig:
     skyward_share: float = knob(0.5, 0.0, 1.0)
     """Share of views in open air that are taken from low down and look up: things before the sky."""
     skyward: Range = knob((0.5, 2.5), -10.0, 10.0)
-    """How far below the middle of those pictures the horizon lies; 1 is their lower edge."""
+    """How far below the middle of those pictures the horizon lies; 1 is their lower edge. Less in v1 to v3,
+    whose objects are low."""
 
     def __post_init__(self) -> None:
         check_knobs(self)
