@@ -31,7 +31,7 @@ from fsid.errors import FsidError
 from fsid.sensor.mosaic import site_offsets
 from fsid.sensor.quantise import ROUNDING_DN2
 from fsid.sensor.raw import NoiseLevel, Raw, four
-from fsid.sensor.stored_noise import censored
+from fsid.sensor.stored_noise import before_clipping, censored
 
 UNLIKE = 4.0  # times a variance: two stops of ISO, beyond what texture makes in photographs
 SITE_SPREAD = (0.1, 0.3)  # relative, of k and sigma2: twelve published phones
@@ -127,8 +127,8 @@ _HIGH_MEDIAN = 2 * gammaincinv(_HIGH.sum() / 2, 0.5) / _HIGH.sum()  # freedom; s
 _NEAR_0 = 0.75  # of the way from black to DN 0, beyond which the least value is taken for DN 0
 _SEEN = 6  # power of the share that DN 0 leaves, in the weight of a pool (17 photographs: 2 and 6 tried)
 _SIGMAS = np.linspace(-0.5, 5, 276)  # of light above DN 0; none is below, but for chance
-_SHIFT, _LEFT, _CUT = censored(-_SIGMAS, np.full_like(_SIGMAS, 1e9))  # of noise that ends at DN 0 alone
-_TINY = 1e-9
+_NO_WHITE = 1e9  # blocks with saturated pixels do not count
+_SHIFT, _LEFT, _ = censored(-_SIGMAS, np.full_like(_SIGMAS, _NO_WHITE))
 _MEDIAN_EFFICIENCY = 2 / np.pi  # of the median against the mean
 
 
@@ -217,24 +217,13 @@ def _pools(blocks: _Blocks, line: np.ndarray) -> _Pools:
         [np.median(blocks.high[part] / expected[part]) * expected[part].mean() for part in parts]
     )
     freedom = np.array([part.size * blocks.share * _HIGH.sum() * _MEDIAN_EFFICIENCY for part in parts])
-    light, noise, seen = _before_cut_off(mean, variance / _HIGH_MEDIAN, blocks.lowest)
-    return _Pools(light, noise, freedom * seen**_SEEN)
+    light, noise, clipped = before_clipping(mean, variance / _HIGH_MEDIAN, blocks.lowest, _NO_WHITE)
+    return _Pools(light, noise, freedom * (1 - clipped) ** _SEEN)
 
 
 def _left(sigmas: np.ndarray) -> np.ndarray:
     """(n,) share of its variance that noise keeps whose mean DN 0 leaves so many sigmas above itself."""
     return np.interp(sigmas, _SIGMAS + _SHIFT, _LEFT)
-
-
-def _before_cut_off(
-    mean: np.ndarray, variance: np.ndarray, lowest: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Light, variance and the share that is not cut off, from mean and variance of what is stored; (n,)."""
-    ratio = variance / np.maximum(mean - lowest, _TINY) ** 2
-    sigmas = np.interp(-ratio, -_LEFT / (_SIGMAS + _SHIFT) ** 2, _SIGMAS)
-    shift, left, cut = (np.interp(sigmas, _SIGMAS, values) for values in (_SHIFT, _LEFT, _CUT))
-    noise = variance / left
-    return mean - shift * np.sqrt(noise), noise, 1 - cut
 
 
 def _line(pools: _Pools, floor: float) -> tuple[np.ndarray, np.ndarray]:

@@ -65,8 +65,8 @@ def before_rounding(variance: np.ndarray, places: np.ndarray) -> tuple[np.ndarra
 def before_clipping(
     mean: np.ndarray, variance: np.ndarray, lowest: float, highest: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(mu, tau^2, share clipped) from mean and variance of clipped noise, all (n,); DN, DN^2."""
-    mu, tau2 = mean.astype(np.float64), np.maximum(variance, 1e-9)
+    """(mu, tau^2, share clipped) from mean and variance of clipped noise, all (n,); in any unit."""
+    mu, tau2 = mean.astype(np.float64), np.maximum(variance, 1e-15)
     share = np.zeros_like(mu)
     reached = np.minimum(mean - lowest, highest - mean) < _REACH * np.sqrt(tau2)
     for _ in range(_INVERSIONS if reached.any() else 0):
