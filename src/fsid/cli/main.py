@@ -201,8 +201,8 @@ def _check_options(arguments: Sequence[str]) -> None:
     ]
     command = COMMANDS.get(arguments[0]) if arguments else None
     parameters = signature(command).parameters.values() if command else ()
-    known = {"--help", *(f"--{p.name.replace('_', '-')}" for p in parameters if p.kind is p.KEYWORD_ONLY)}
-    known |= {"-h", "-o"} if "--output" in known else {"-h"}
+    options = {f"--{p.name.replace('_', '-')}" for p in parameters if p.kind is p.KEYWORD_ONLY}
+    known = options | {"-h", "--help"} | ({"-o"} if "--output" in options else set())
     for name in names:
         if command and name not in known:
             near = get_close_matches(name, sorted(known), n=1)
