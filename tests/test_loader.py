@@ -26,7 +26,7 @@ from fsid.config import save_settings  # noqa: E402
 from fsid.dataset import index  # noqa: E402
 from fsid.dataset.config import DatasetConfig, GenerateConfig  # noqa: E402
 from fsid.dataset.feed import batches  # noqa: E402
-from fsid.dataset.index import identity, index_mosaics  # noqa: E402
+from fsid.dataset.index import dataset_digest, index_mosaics  # noqa: E402
 from fsid.dataset.loader import Batch, PatchConfig, PatchDataset, packed, window_rand  # noqa: E402
 from fsid.dataset.noise_levels import LevelTable  # noqa: E402
 from fsid.dataset.patch_grid import Grid  # noqa: E402
@@ -444,11 +444,13 @@ def test_a_dataset_without_config_yaml_is_told_by_its_first_clean_image(tmp_path
     (tmp_path / "b").mkdir()
     write_dataset(tmp_path / "a", [raw(np.full((HEIGHT, WIDTH), 9000))])
     write_dataset(tmp_path / "b", [raw(np.full((HEIGHT, WIDTH), 9001))])
-    first = identity(tmp_path / "a")
-    assert first == identity((tmp_path / "a").rename(tmp_path / "moved")) != identity(tmp_path / "b")
+    first = dataset_digest(tmp_path / "a")
+    assert (
+        first == dataset_digest((tmp_path / "a").rename(tmp_path / "moved")) != dataset_digest(tmp_path / "b")
+    )
     write_shard(shard_path(tmp_path, 0), [("00000000", {"rgb.png": b""})])
     with pytest.raises(FsidError, match=r"its shards hold no \*\.clean\.dng"):
-        identity(tmp_path)
+        dataset_digest(tmp_path)
 
 
 @pytest.mark.parametrize("key", ["./scene_a_0001", "abc", "../../evil", "9" * 5000])

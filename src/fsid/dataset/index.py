@@ -124,7 +124,7 @@ def _split_by_scene(mosaics: Collection[StoredMosaic]) -> tuple[StoredMosaic, ..
     return tuple(replace(m, split="validation") if m.scene in kept else m for m in mosaics)
 
 
-def identity(data_dir: Path) -> str:
+def dataset_digest(data_dir: Path) -> str:
     """What tells a dataset from others, wherever it lies and however far it has grown.
 
     A digest of its config.yaml, or where there is none of its first clean image. FsidError as in

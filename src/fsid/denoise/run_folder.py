@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from fsid.config import load_settings, save_settings, to_plain
-from fsid.dataset.index import StoredMosaic, identity
+from fsid.dataset.index import StoredMosaic, dataset_digest
 from fsid.denoise.initial_weights import drop_initial, has_network, keep_initial
 from fsid.denoise.model import Denoiser
 from fsid.denoise.sessions import SESSIONS_FILE, read_sessions
@@ -98,7 +98,7 @@ def check_same_training(run_dir: Path, config: TrainConfig) -> None:
 
 def _check_same_data(data_dir: Path, run_dir: Path, kept: Sequence[StoredMosaic]) -> None:
     """FsidError where a training has begun in `run_dir` on other data than `data_dir`, or holds out more."""
-    data = identity(data_dir)
+    data = dataset_digest(data_dir)
     if any(row.get("data", data) != data for row in read_sessions(run_dir)):
         raise FsidError(
             f"{run_dir}: this run was started on other data than {data_dir}; "

@@ -13,7 +13,7 @@ from accelerate import Accelerator
 
 from fsid.config import to_plain
 from fsid.dataset.config import DATASET_FILE
-from fsid.dataset.index import StoredMosaic, identity, index_mosaics
+from fsid.dataset.index import StoredMosaic, dataset_digest, index_mosaics
 from fsid.denoise.checkpoint import TrainState, save_checkpoint
 from fsid.denoise.denoise import variance_at_grey
 from fsid.denoise.model import MODEL_FILE, Denoiser, ModelCard, save_model
@@ -60,7 +60,7 @@ class RunOutput:
             command,
             state.step,
             accelerator.num_processes,
-            identity(data_dir),
+            dataset_digest(data_dir),
             profiles_digest(config.profiles),
             [mosaic.key for mosaic in kept],
         )

@@ -33,7 +33,7 @@ SESSIONS_FILE = "sessions.json"
 class Session:
     """The row of a run that starts now at `first_step`.
 
-    data: `fsid.dataset.index.identity`. noise: `fsid.sensor.profiles.profiles_digest`.
+    data: `fsid.dataset.index.dataset_digest`. noise: `fsid.sensor.profiles.profiles_digest`.
     """
 
     def __init__(
