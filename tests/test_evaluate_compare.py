@@ -6,6 +6,7 @@ import dataclasses
 import json
 import os
 import shutil
+import struct
 from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
@@ -39,6 +40,9 @@ from fsid.evaluate.results import MOST_DB, Row, confidence
 from fsid.evaluate.testset import staged, write_testset
 from fsid.files import write_atomically
 from fsid.sensor import Raw, develop, read_raw, write_dng
+from fsid.sensor.gain_maps import shading_gains
+from fsid.sensor.metadata import OPCODES_2, Metadata
+from fsid.sensor.tiff import Tag
 
 
 @pytest.fixture(scope="module")
@@ -187,12 +191,16 @@ def test_a_method_may_work_in_place(small_set: Path):
 
 
 def test_a_capture_is_developed_with_the_colours_of_its_truth(small_set: Path, tmp_path: Path):
-    """Further frames of a burst state a white balance of their own, by which no error is to be measured."""
+    """Further frames of a burst state white balance and lens shading of their own, by which no error is to be
+    measured."""
+    darker = struct.pack(">I4I10I4dIf", 1, 9, 0, 0, 80, 0, 0, 99, 99, 0, 1, 1, 1, 1, 1, 1, 1, 0, 0, 1, 0.5)
+    metadata = Metadata(mosaic=(Tag(OPCODES_2, 7, darker),))
     shutil.copytree(small_set, tmp_path / "set")
     for capture in read_testset(tmp_path / "set").captures(tmp_path / "set"):
         raw = read_raw(capture)
         colours = {"white_balance": (1.5, 1.0, 2.4), "xyz_to_camera": raw.xyz_to_camera[::-1]}
-        write_dng(capture, dataclasses.replace(raw, **colours))
+        write_dng(capture, dataclasses.replace(raw, metadata=metadata, **colours))
+    assert shading_gains(read_raw(capture).metadata.opcodes_of_linear, (8, 8)).max() == 0.5
     assert compare(tmp_path / "set", [NOISY]).rows == compare(small_set, [NOISY]).rows
 
 

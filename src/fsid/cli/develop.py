@@ -8,7 +8,8 @@ from tyro.conf import Positional
 
 
 def develop(input: Positional[Path], output: Positional[Path]) -> None:
-    """Develop a RAW file into an upright sRGB PNG: white balance, demosaicing, colour matrix, no tone curve.
+    """Develop a RAW file into an upright sRGB PNG: gain maps of a phone's DNG, white balance,
+    demosaicing, colour matrix, no tone curve.
 
     Args:
         input: DNG or any other Bayer RAW that LibRaw opens.

@@ -132,11 +132,16 @@ def _read(root: Path, testset: TestSet, image: TestImage, level: str) -> tuple[R
 
 
 def _noisy(path: Path, truth: Raw) -> Raw:
-    """A capture, with the colours of its truth: a phone may balance white in each frame of a burst anew."""
+    """A capture, with the colours and gain maps of its truth: a phone may make them anew for each frame."""
     noisy = read_raw(path)
     if truth.mosaic.shape != noisy.mosaic.shape or truth.cfa != noisy.cfa:
         raise FsidError(f"{path}: size or CFA differs from its clean.dng")
-    return replace(noisy, white_balance=truth.white_balance, xyz_to_camera=truth.xyz_to_camera)
+    return replace(
+        noisy,
+        white_balance=truth.white_balance,
+        xyz_to_camera=truth.xyz_to_camera,
+        metadata=truth.metadata,
+    )
 
 
 def _denoised(method: Method, frame: Raw, path: Path) -> Raw:

@@ -2,8 +2,8 @@
 
     FixBadPixelsConstant: all of one value       FixBadPixelsList: places (row, column) and rectangles
 
-LibRaw applies no opcodes, and a bad pixel that reaches a denoiser stays as a dot which no converter finds any
-more. Each becomes the mean of the good pixels of its site around it, the nearest ones first.
+A bad pixel that reaches a denoiser stays as a dot which no converter finds any more. Each becomes the mean of
+the good pixels of its site around it, the nearest ones first.
 """
 
 from __future__ import annotations
@@ -14,18 +14,16 @@ import numpy as np
 from scipy.ndimage import convolve
 
 from fsid.sensor.mosaic import TILE
+from fsid.sensor.opcodes import opcodes
 
 _CONSTANT, _LIST = 4, 5
-_MAX_OPCODES = 1 << 10
 _MAX_RECTANGLES = 1 << 12  # more than any sensor has; a broken list may hold millions
 _REACH = 32  # pixels of a site from the nearest good one: of a cluster, a column or a small rectangle
 _AROUND = np.array([[0.5, 1, 0.5], [1, 0, 1], [0.5, 1, 0.5]], np.float32)
 """Of the pixels of a site; those at the corners are farther."""
 
 
-def bad_pixels(
-    opcodes: bytes, dn: np.ndarray, first: tuple[int, int], table: np.ndarray | None
-) -> np.ndarray:
+def bad_pixels(listed: bytes, dn: np.ndarray, first: tuple[int, int], table: np.ndarray | None) -> np.ndarray:
     """(H, W) bool: which of `dn`, a part of the stored pixels, an OpcodeList1 calls bad.
 
     first: (row, column) of the part's first pixel, since the list counts from the first one stored. table: by
@@ -33,7 +31,7 @@ def bad_pixels(
     list, or goes on beyond the pixels, says nothing.
     """
     found = np.zeros(dn.shape, bool)
-    for number, data in _opcodes(opcodes):
+    for number, data in opcodes(listed):
         if number == _CONSTANT and len(data) == 8:
             value = struct.unpack(">I", data[:4])[0]
             if table is not None:
@@ -68,19 +66,3 @@ def mended(mosaic: np.ndarray, bad: np.ndarray) -> np.ndarray:
             plane[reached] = total[reached] / weight[reached]
             good = good | reached
     return mosaic
-
-
-def _opcodes(data: bytes) -> list[tuple[int, bytes]]:
-    """(number, parameters) of each, up to the first one that is not whole; always big endian."""
-    if len(data) < 4:
-        return []
-    found, at = [], 4
-    for _ in range(min(struct.unpack(">I", data[:4])[0], _MAX_OPCODES)):
-        if at + 16 > len(data):
-            break
-        number, _, _, size = struct.unpack_from(">4I", data, at)
-        if at + 16 + size > len(data):
-            break
-        found.append((number, data[at + 16 : at + 16 + size]))
-        at += 16 + size
-    return found

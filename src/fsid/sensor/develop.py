@@ -1,7 +1,8 @@
 """RAW to picture, the plain way: the same for every image, so that pictures can be compared.
 
-    srgb = e(CCM demosaic(min(white_balance x, saturation)))
+    srgb = e(CCM demosaic(min(white_balance shading x, saturation)))
 
+The shading is what the gain maps of a phone's DNG make even, 1 where there are none.
 White balance comes before demosaicing (the interpolation mixes colours and wants them alike) and is followed
 by a clip at the level that every channel can reach, so that a saturated highlight is white and not pink.
 Nothing is clipped at black before the last step: noise below black must average out, not brighten shadows.
@@ -13,6 +14,7 @@ import numpy as np
 
 from fsid.sensor.colour import apply_matrix, camera_to_srgb_matrix
 from fsid.sensor.demosaic import demosaic
+from fsid.sensor.gain_maps import shading_gains
 from fsid.sensor.mosaic import SITE_CHANNEL, site_offsets
 from fsid.sensor.raw import Raw, check_raw
 from fsid.sensor.tone import srgb_encode
@@ -23,7 +25,10 @@ _STRIP = 8  # rows at once: what is in between stays in the cache
 
 
 def develop(raw: Raw) -> np.ndarray:
-    """Picture (H, W, 3) float32, sRGB-encoded 0..1, of a RAW of at least 4x4 pixels. No tone curve."""
+    """Picture (H, W, 3) float32, sRGB-encoded 0..1, of a RAW of at least 4x4 pixels. No tone curve.
+
+    What a phone's lens darkened, and a DNG holds gain maps against, is even.
+    """
     check_raw(raw)
     picture, matrix = _camera_rgb(raw), camera_to_srgb_matrix(raw.xyz_to_camera)
     for first in range(0, len(picture), _STRIP):
@@ -42,6 +47,9 @@ def _camera_rgb(raw: Raw) -> np.ndarray:
     """(H, W, 3) float32, white-balanced."""
     gains = np.asarray(raw.white_balance, np.float32) / np.float32(min(raw.white_balance))
     balanced = raw.mosaic.astype(np.float32)
+    shading = shading_gains(raw.metadata.opcodes_of_linear, raw.mosaic.shape)
+    if shading is not None:
+        balanced *= shading
     for (r, c), channel in zip(site_offsets(raw.cfa), SITE_CHANNEL, strict=True):
         balanced[r::2, c::2] *= gains[channel]
     np.minimum(balanced, 1, out=balanced)

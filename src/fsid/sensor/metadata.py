@@ -19,7 +19,7 @@ from fsid.sensor.tiff import ASCII, RATIONAL, SHORT, Tag, rationals
 
 ORIENTATION, EXPOSURE_TIME, F_NUMBER, FOCAL_LENGTH, LENS_MODEL = 274, 33434, 33437, 37386, 42036
 DATE_TAKEN = 36867
-CROP_ORIGIN, CROP_SIZE, NOISE_REMOVED = 50719, 50720, 50935
+CROP_ORIGIN, CROP_SIZE, NOISE_REMOVED, OPCODES_2 = 50719, 50720, 50935, 51009
 COLOUR_MATRICES = frozenset((*range(50721, 50728), 50778, 50779, 50964, 50965))  # and their analog balance
 
 # Description, make, model, orientation, date, artist, copyright; DNG: camera, colour, lens, profile.
@@ -28,9 +28,9 @@ _FIRST |= frozenset((50730, 50731, 50732, 50734, 50735, 50736, 50739, 50931, 509
 _FIRST |= frozenset((*range(50936, 50943), 50981, 50982, 51107, 51108, 51109, 51110))
 # Crop, green split, chroma blur, anti-alias, scale; lens corrections that converters apply to linear data.
 _MOSAIC = frozenset(
-    (CROP_ORIGIN, CROP_SIZE, NOISE_REMOVED, 50718, 50733, 50737, 50738, 50780, 51009, 51022, 51125)
+    (CROP_ORIGIN, CROP_SIZE, NOISE_REMOVED, 50718, 50733, 50737, 50738, 50780, OPCODES_2, 51022, 51125)
 )
-_GEOMETRY = frozenset((CROP_ORIGIN, CROP_SIZE, 51009, 51022, 51125))
+_GEOMETRY = frozenset((CROP_ORIGIN, CROP_SIZE, OPCODES_2, 51022, 51125))
 _EXIF = frozenset((EXPOSURE_TIME, F_NUMBER, 34850, 34855, 34864, 34865, 34866, 34867, 36864, 36867, 36868))
 _EXIF |= frozenset((*range(37377, 37387), 37510, 37520, 37521, 37522, 41985, 41986, 41987, 41989, 41990))
 _EXIF |= frozenset((36880, 36881, 42033, 42034, 42035, FOCAL_LENGTH, LENS_MODEL, 42037))
@@ -64,6 +64,12 @@ class Metadata:
         return next(
             (value for tag in self.mosaic if tag.code == NOISE_REMOVED for value in _numbers(tag)), 0.0
         )
+
+    @property
+    def opcodes_of_linear(self) -> bytes:
+        """A DNG's OpcodeList2, b"" where there is none."""
+        values = next((tag.values for tag in self.mosaic if tag.code == OPCODES_2), b"")
+        return values if isinstance(values, bytes) else b""
 
     def with_noise_removed(self, share: float) -> Metadata:
         """The same for an image that was denoised, so that converters need not smooth it once more."""
