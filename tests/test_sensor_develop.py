@@ -28,7 +28,8 @@ from fsid.sensor import (
     write_dng,
 )
 from fsid.sensor.colour import published_matrices
-from fsid.sensor.metadata import exposure_metadata
+from fsid.sensor.metadata import BASELINE_EXPOSURE, Metadata, exposure_metadata
+from fsid.sensor.tiff import DOUBLE, Tag
 from fsid.sensor.tone import inverse_tone_curve, photo_to_linear, srgb_decode, tone_curve
 
 cfas = pytest.mark.parametrize("cfa", CFA_PATTERNS)
@@ -162,3 +163,16 @@ def test_the_command_develops_a_sideways_file_upright(tmp_path):
     assert picture.shape == (48, 32, 3)
     plain = np.rint(255 * develop(read_raw(tmp_path / "a.dng")))
     assert np.max(np.abs(picture - np.rot90(plain, -1))) <= 1
+
+
+@pytest.mark.parametrize(("stops", "shown"), [(1.5, 1.5), (0.0, 0.0), (-2.0, 0.0), (np.nan, 0.0), (1e9, 8.0)])
+def test_a_picture_is_as_bright_as_its_dng_asks_for(stops, shown):
+    """Below white; an exposure below 0 would make white grey."""
+    camera = np.full((16, 16, 3), 0.001, np.float32)
+    raw = _raw(camera, "RGGB", published_matrices()[0], (2.0, 1.0, 1.5))
+    asked = replace(raw, metadata=Metadata(first=(Tag(BASELINE_EXPOSURE, DOUBLE, (stops,)),)))
+    brighter = replace(raw, mosaic=raw.mosaic * np.float32(2**shown))
+    np.testing.assert_allclose(develop(asked), develop(brighter), atol=1e-5)
+    np.testing.assert_array_equal(develop_linear(asked), develop_linear(raw))
+    white = replace(asked, mosaic=np.ones_like(raw.mosaic))
+    np.testing.assert_allclose(develop(white), 1, atol=1e-5)

@@ -8,8 +8,9 @@ from tyro.conf import Positional
 
 
 def develop(input: Positional[Path], output: Positional[Path]) -> None:
-    """Develop a RAW file into an upright sRGB PNG: gain maps of a phone's DNG, white balance,
-    demosaicing, colour matrix, no tone curve.
+    """Develop a RAW file into an upright sRGB PNG: white balance, demosaicing, colour matrix, no tone curve.
+
+    Gain maps and BaselineExposure of a DNG are applied, lens distortion is left.
 
     Args:
         input: DNG or any other Bayer RAW that LibRaw opens.

@@ -132,7 +132,7 @@ def _read(root: Path, testset: TestSet, image: TestImage, level: str) -> tuple[R
 
 
 def _noisy(path: Path, truth: Raw) -> Raw:
-    """A capture, with the colours and gain maps of its truth: a phone may make them anew for each frame."""
+    """A capture, to be developed as its truth is: a phone may balance white in each frame of a burst anew."""
     noisy = read_raw(path)
     if truth.mosaic.shape != noisy.mosaic.shape or truth.cfa != noisy.cfa:
         raise FsidError(f"{path}: size or CFA differs from its clean.dng")

@@ -1,8 +1,11 @@
 """RAW to picture, the plain way: the same for every image, so that pictures can be compared.
 
-    srgb = e(CCM demosaic(min(white_balance shading x, saturation)))
+    srgb = e(2^b CCM demosaic(min(white_balance shading x, saturation)))
 
-The shading is what the gain maps of a phone's DNG make even, 1 where there are none.
+The shading is what the gain maps of a phone's DNG make even, 1 where there are none. b is its
+BaselineExposure: a phone that exposed for the highlights means its pictures to be shown brighter. One below
+0 is left to converters that have a tone curve, since it would make white grey.
+
 White balance comes before demosaicing (the interpolation mixes colours and wants them alike) and is followed
 by a clip at the level that every channel can reach, so that a saturated highlight is white and not pink.
 Nothing is clipped at black before the last step: noise below black must average out, not brighten shadows.
@@ -20,17 +23,18 @@ from fsid.sensor.raw import Raw, check_raw
 from fsid.sensor.tone import srgb_encode
 
 _TURNED, _UPSIDE_DOWN, _MIRRORED = {5, 6, 7, 8}, {3, 4, 7, 8}, {2, 3, 6, 7}  # orientations
-
+_MOST_STOPS = 8.0  # more than any camera means
 _STRIP = 8  # rows at once: what is in between stays in the cache
 
 
 def develop(raw: Raw) -> np.ndarray:
     """Picture (H, W, 3) float32, sRGB-encoded 0..1, of a RAW of at least 4x4 pixels. No tone curve.
 
-    What a phone's lens darkened, and a DNG holds gain maps against, is even.
+    A phone's DNG is shown as bright and as even as it asks for (BaselineExposure, gain maps).
     """
     check_raw(raw)
-    picture, matrix = _camera_rgb(raw), camera_to_srgb_matrix(raw.xyz_to_camera)
+    exposure = 2 ** min(max(0.0, raw.metadata.baseline_exposure), _MOST_STOPS)  # 0 where it is NaN
+    picture, matrix = _camera_rgb(raw), camera_to_srgb_matrix(raw.xyz_to_camera) * np.float32(exposure)
     for first in range(0, len(picture), _STRIP):
         rows = slice(first, first + _STRIP)
         picture[rows] = srgb_encode(apply_matrix(matrix, picture[rows]))

@@ -18,13 +18,13 @@ import rawpy
 from fsid.sensor.tiff import ASCII, RATIONAL, SHORT, Tag, rationals
 
 ORIENTATION, EXPOSURE_TIME, F_NUMBER, FOCAL_LENGTH, LENS_MODEL = 274, 33434, 33437, 37386, 42036
-DATE_TAKEN = 36867
+DATE_TAKEN, BASELINE_EXPOSURE = 36867, 50730
 CROP_ORIGIN, CROP_SIZE, NOISE_REMOVED, OPCODES_2 = 50719, 50720, 50935, 51009
 COLOUR_MATRICES = frozenset((*range(50721, 50728), 50778, 50779, 50964, 50965))  # and their analog balance
 
 # Description, make, model, orientation, date, artist, copyright; DNG: camera, colour, lens, profile.
 _FIRST = frozenset((270, 271, 272, ORIENTATION, 306, 315, 33432, 50707, 50708, 50709)) | COLOUR_MATRICES
-_FIRST |= frozenset((50730, 50731, 50732, 50734, 50735, 50736, 50739, 50931, 50932))
+_FIRST |= frozenset((BASELINE_EXPOSURE, 50731, 50732, 50734, 50735, 50736, 50739, 50931, 50932))
 _FIRST |= frozenset((*range(50936, 50943), 50981, 50982, 51107, 51108, 51109, 51110))
 # Crop, green split, chroma blur, anti-alias, scale; lens corrections that converters apply to linear data.
 _MOSAIC = frozenset(
@@ -64,6 +64,12 @@ class Metadata:
         return next(
             (value for tag in self.mosaic if tag.code == NOISE_REMOVED for value in _numbers(tag)), 0.0
         )
+
+    @property
+    def baseline_exposure(self) -> float:
+        """By how many stops the camera wants its picture shown brighter; 0 where nothing is said."""
+        numbers = (number for tag in self.first if tag.code == BASELINE_EXPOSURE for number in _numbers(tag))
+        return next(numbers, 0.0)
 
     @property
     def opcodes_of_linear(self) -> bytes:
