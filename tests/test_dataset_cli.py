@@ -149,6 +149,10 @@ def test_meshes_that_are_skipped_are_counted_and_the_first_is_named(
     said = capsys.readouterr().err
     assert "reading" in said
     assert re.search(r"1 mesh, 1 skipped, first \S*junk\.ply: \w+", said.replace("\n", " "))
+    read_libraries(SceneConfig(mesh_folders=(str(tmp_path),)), quiet=True)
+    said = capsys.readouterr().err
+    assert said.startswith(f"{tmp_path}: 1 mesh, 1 skipped, first ")
+    assert said.count("\n") == 1
     with pytest.raises(FsidError, match="no usable mesh"):
         read_libraries(SceneConfig(mesh_folders=(str(tmp_path / "junk.ply"),)), quiet=True)
 

@@ -275,7 +275,9 @@ def test_noise_beyond_networks_is_said(
         main(command)
         assert ("c.dng: more noise than the network knows" in capsys.readouterr().err) == told
         main([*command, "--quiet"])
-        assert capsys.readouterr().err == ""
+        said = capsys.readouterr().err
+        assert ("c.dng: more noise than the network knows" in said) == told
+        assert all(line.startswith("note: ") for line in said.splitlines())
 
 
 def test_a_network_knows_the_noise_that_its_card_says(
@@ -691,12 +693,10 @@ def test_files_in_subfolders_are_left_out_and_counted(
     command = ["denoise", str(folder), str(folder / "out"), "--model", str(network)]
     assert f"{folder / 'day1' / 'a.dng'} lies deeper" in refused(*command)
     write_dng(folder / "a.dng", noisy_raw())
-    for _ in range(2):  # the second time results lie inside, too
-        main(command)
+    for options in ([], ["--quiet"]):  # the second time results lie inside, too
+        main([*command, *options])
         (line,) = (line for line in capsys.readouterr().err.splitlines() if "left out" in line)
         assert line.startswith(f"note: files in folders inside {folder} are left out (2, the first one")
-    main([*command, "--quiet"])
-    assert capsys.readouterr().err == ""
 
 
 def test_files_of_the_other_kind_are_left_out_and_counted(
@@ -719,7 +719,7 @@ def test_files_of_the_other_kind_are_left_out_and_counted(
         assert line.endswith(f"denoise them {advice} --cfa, --black-level and --white-level")
         assert len(list(out.iterdir())) == 2
         main(["denoise", str(folder), str(out), "--model", str(network), *options, "--quiet"])
-        assert capsys.readouterr().err == ""
+        assert line in capsys.readouterr().err.splitlines()
 
 
 def test_noise_far_beyond_the_profile_is_said_once_per_run(
@@ -740,7 +740,7 @@ def test_noise_far_beyond_the_profile_is_said_once_per_run(
     assert said(str(folder / "a.dng"), str(tmp_path / "a.dng")) == []
     (line,) = said(str(folder / "a.dng"), str(tmp_path / "a.dng"), "--iso", "20000")
     assert line.endswith("its noise at ISO 20000 is extrapolated far")
-    assert said(str(folder / "b.dng"), str(tmp_path / "b.dng"), "--quiet") == []
+    assert len(said(str(folder / "b.dng"), str(tmp_path / "b.dng"), "--quiet")) == 1
 
 
 def test_a_profile_without_colour_filters_is_refused(tmp_path: Path) -> None:

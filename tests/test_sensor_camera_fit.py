@@ -215,6 +215,15 @@ def test_a_frame_of_another_size_is_named(tmp_path, rng):
     _fails(words, [*paths, *larger], dark=dark)
 
 
+def test_what_is_wrong_with_frames_is_said_with_quiet_too(tmp_path, rng, capsys):
+    write_burst(tmp_path / "frames", rng, scene(0.5), 1600, 3)
+    main(["calibrate", str(tmp_path / "frames"), "-o", str(tmp_path / "p.yaml"), "--quiet"])
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert "note: ISO 1600: k is uncertain by" in err
+    assert all(line.startswith("note: ") for line in err.splitlines())
+
+
 def test_the_name_of_a_camera_is_printed_as_it_is(tmp_path, rng, capsys):
     write_burst(tmp_path / "frames", rng, scene(0.5), 1600, 3)
     name, source = "mine [b] [/home/me]", "bench [red], [/lab/2]"

@@ -521,13 +521,11 @@ def test_a_range_far_beyond_the_measured_isos_is_noted_and_two_stops_are_not(tmp
     assert [profile.name for profile in far_extrapolated([path, "pixel6"], 400, 8000)] == ["mine"]
     assert not list(far_extrapolated([path], 25, 1600))
     assert not list(far_extrapolated(profile_names(), 100, 12800))
-    note_extrapolation([str(path)], 20, 400, quiet=False)
+    note_extrapolation([str(path)], 20, 400)
     said = " ".join(capsys.readouterr().err.split())
     assert said == (
         "note: profile mine was measured at ISO 100 to 400; its noise at ISO 20 to 400 is extrapolated far"
     )
-    note_extrapolation([str(path)], 20, 400, quiet=True)
-    assert capsys.readouterr().err == ""
 
 
 @pytest.mark.parametrize(("standard_errors", "is_pooled"), [(2.5, True), (3.5, False)])

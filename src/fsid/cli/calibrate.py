@@ -59,7 +59,7 @@ def calibrate(
         tie_greens: Fit one line to Gr and Gb.
         terms: Measure banding, fixed pattern, PRNU, heavy tails, drift, dark current and defects too, as far
             as the frames show them, and switch them on in the profile.
-        quiet: No progress bar, no table.
+        quiet: No progress bar, no table; notes are printed.
     """
     from fsid.files import write_together
     from fsid.sensor import Layout
@@ -84,7 +84,7 @@ def calibrate(
     pictures = {} if plot is None else {plot: calibration_picture(found, plot.suffix)}
     write_together({**pictures, output: profile_file(found.profile)})
     for line in found.notes:
-        note(line, quiet=quiet)
+        note(line)
     print_table(_table(found), quiet=quiet)
 
 

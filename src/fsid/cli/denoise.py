@@ -78,7 +78,7 @@ def denoise(
         width: Width of a .raw or .bin mosaic in pixels.
         height: Height of a .raw or .bin mosaic in pixels.
         skip_existing: Leave alone what an earlier, interrupted run over a folder has made.
-        quiet: No progress bar, no line on the noise level.
+        quiet: No progress bar, no line on the noise level; warnings are printed.
     """
     from fsid.denoise import check_options, denoise_file, denoise_folder, find_raws, load_model
     from fsid.denoise.denoise import most_noise
@@ -92,19 +92,19 @@ def denoise(
         raise FsidError("--skip-existing: is for a folder of files; leave it out")
     if layout is not None:
         _check_layout(layout, sources or [input])
-        note_other_frames(layout, profile, quiet=quiet)
+        note_other_frames(layout, profile)
     network = load_model(model, backend)
     check_options(profile, iso, strength, layout)
     console = Terminal(stderr=True)
     if profile is not None and iso is not None:
-        note_extrapolation([profile], iso, iso, quiet=quiet)
+        note_extrapolation([profile], iso, iso)
     elif profile is not None:
-        note_files(profile, sources or [input], quiet=quiet)
+        note_files(profile, sources or [input])
     if sources is not None:
-        if not quiet:
-            note_left_out(input, output, bare=layout is not None)
-        if skip_existing and (made := [path for path in sources if target_in(output, path).is_file()]):
-            note(f"{len(made)} of {len(sources)} files are in {output} already and left alone", quiet=quiet)
+        note_left_out(input, output, bare=layout is not None)
+        made = [path for path in sources if target_in(output, path).is_file()] if skip_existing else []
+        if made and not quiet:
+            note(f"{len(made)} of {len(sources)} files are in {output} already and left alone")
         noises: dict[Path, Noise] = {}
         try:
             with progress_bar("denoising", "files", quiet=quiet) as progress:
@@ -124,9 +124,10 @@ def denoise(
                     failed=lambda error: console.print(error_line(error), soft_wrap=True),
                 )
         finally:  # what is to be said of those that are done does not depend on the others
-            note_guessed(noises, quiet=quiet)
-            note_noises(noises, most_noise(network.card), quiet=quiet)
-            note_hot_pixels(noises, quiet=quiet or not mend_hot_pixels)
+            note_guessed(noises)
+            note_noises(noises, most_noise(network.card))
+            if mend_hot_pixels and not quiet:
+                note_hot_pixels(noises)
         return
     with progress_bar("denoising", "tiles", quiet=quiet) as progress:
         noise = denoise_file(
@@ -145,8 +146,9 @@ def denoise(
         k, sigma2 = (sum(values) / 4 for values in (noise.level.k, noise.level.sigma2))
         line = f"noise: {noise.source}, k = {k:.3g}, sigma2 = {sigma2:.3g}"
         console.print(Text(line), soft_wrap=True)
-    note_noises({input: noise}, most_noise(network.card), quiet=quiet)
-    note_hot_pixels({input: noise}, quiet=quiet or not mend_hot_pixels)
+    note_noises({input: noise}, most_noise(network.card))
+    if mend_hot_pixels and not quiet:
+        note_hot_pixels({input: noise})
 
 
 def _check_layout(layout: Layout, paths: Sequence[Path]) -> None:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from fsid.sensor import Layout
 
 
-def note_other_frames(layout: Layout, profile: str | None, *, quiet: bool) -> None:
+def note_other_frames(layout: Layout, profile: str | None) -> None:
     """Lines where the options state something else than the frames had that the profile was measured on."""
     from fsid.sensor import load_bayer_profile
     from fsid.sensor.camera_fit import apart_dn
@@ -27,30 +27,30 @@ def note_other_frames(layout: Layout, profile: str | None, *, quiet: bool) -> No
     measured = f"profile {profile} was measured on frames of"
     if layout.cfa != camera.cfa:
         line = f"--cfa {layout.cfa}: {measured} {camera.cfa}"
-        note(f"{line}; if this frame is one of those, red and blue are wrong", quiet=quiet)
+        note(f"{line}; if this frame is one of those, red and blue are wrong")
     if layout.white_level != camera.white_level:
         line = f"--white-level {layout.white_level}: {measured} {camera.white_level}"
-        note(f"{line}; if this frame is one of those, its noise is misjudged", quiet=quiet)
+        note(f"{line}; if this frame is one of those, its noise is misjudged")
         return
     sigma2_dn = camera.sigma2 * camera.span**2
     black = site_blacks(camera.measured.black, sigma2_dn)
     if np.abs(black - np.asarray(layout.black_level)).max() > apart_dn(sigma2_dn):
         levels = ",".join(f"{round(level, 1):g}" for level in black.tolist())
         line = f"without --black-level {levels}, as profile {profile} measured, a colour cast stays"
-        note(line, quiet=quiet)
+        note(line)
 
 
-def note_guessed(noises: Mapping[Path, Noise], *, quiet: bool) -> None:
+def note_guessed(noises: Mapping[Path, Noise]) -> None:
     """A line on the files whose noise nothing states."""
     if guessed := [path for path, noise in noises.items() if noise.is_estimated]:
         line = (
             f"the noise of {len(guessed)} of {len(noises)} files, the first one {guessed[0]}, is "
             "estimated from the images; --profile and --iso state it"
         )
-        note(line, quiet=quiet)
+        note(line)
 
 
-def note_noises(noises: Mapping[Path, Noise], most_noise: float, *, quiet: bool) -> None:
+def note_noises(noises: Mapping[Path, Noise], most_noise: float) -> None:
     """Lines on the files that may not be denoised as they should be: those that hold more noise than the
     network knows, that were denoised before, that show far more noise than was taken off, or far less.
 
@@ -60,10 +60,10 @@ def note_noises(noises: Mapping[Path, Noise], most_noise: float, *, quiet: bool)
 
     if strong := [path for path, noise in noises.items() if variance_at_grey(noise.level) > most_noise]:
         line = f"{_named(strong)}: more noise than the network knows"
-        note(f"{line} (variance at mid-grey above {most_noise:.2g}); look at the result", quiet=quiet)
+        note(f"{line} (variance at mid-grey above {most_noise:.2g}); look at the result")
     if left := [path for path, noise in noises.items() if noise.is_left]:
         said = "denoised before, as NoiseReductionApplied says; what is smoothed now may be detail"
-        note(f"{_named(left)}: {said}", quiet=quiet)
+        note(f"{_named(left)}: {said}")
     shown = {path: noise.shown for path, noise in noises.items() if noise.shown is not None}
     for result, digits, unlike in (
         ("noisy", 0, [path for path, times in shown.items() if times > 1]),
@@ -72,16 +72,16 @@ def note_noises(noises: Mapping[Path, Noise], most_noise: float, *, quiet: bool)
         if unlike:
             times, source = f"{shown[unlike[0]]:.{digits}f}", noises[unlike[0]].source
             line = f"{_named(unlike)}: shows {times} times the noise variance of {source}"
-            note(f"{line}; the result may be {result}", quiet=quiet)
+            note(f"{line}; the result may be {result}")
 
 
-def note_hot_pixels(noises: Mapping[Path, Noise], *, quiet: bool) -> None:
+def note_hot_pixels(noises: Mapping[Path, Noise]) -> None:
     """A line on how many pixels were mended."""
     counts = [noise.hot for noise in noises.values()]
     if len(counts) == 1:
-        note(f"hot and dead pixels: {counts[0]} mended", quiet=quiet)
+        note(f"hot and dead pixels: {counts[0]} mended")
     elif counts:
-        note(f"hot and dead pixels: {min(counts)} to {max(counts)} mended in a file", quiet=quiet)
+        note(f"hot and dead pixels: {min(counts)} to {max(counts)} mended in a file")
 
 
 def _named(paths: Sequence[Path]) -> str:

@@ -35,7 +35,7 @@ def evaluate(
         output: Folder of the results.
         ensemble: Each model's results are the mean over so many mirrored and transposed copies of a capture,
             as of fsid denoise; their names in the results say so.
-        quiet: No progress bar.
+        quiet: No progress bar; warnings are printed.
     """
     from fsid.evaluate.models import evaluate_models, write_comparison
     from fsid.sensor import profile_names
@@ -46,10 +46,10 @@ def evaluate(
     with progress_bar("measuring", "captures", quiet=quiet) as progress:
         comparison = evaluate_models(testset, model, ensemble=ensemble, progress=progress, note=notes.append)
     for line in notes:
-        note(line, quiet=quiet)
+        note(line)
     made = comparison.testset
     if made.camera in profile_names():  # that of a file is not there to be asked
-        note_files(made.camera, made.captures(testset), quiet=quiet)
+        note_files(made.camera, made.captures(testset))
     for name in dict.fromkeys(row.set for row in comparison.rows):
         heads = (Column(head, overflow="fold") for head in ("model", *comparison.testset.levels))
         table = Table(*heads, title=f"{name}: PSNR raw / PSNR / SSIM")

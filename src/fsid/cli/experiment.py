@@ -11,6 +11,7 @@ from typing import Any, Literal
 from tyro.conf import Positional
 
 from fsid.cli.arguments import Output
+from fsid.cli.notes import note
 from fsid.cli.progress import progress_bar
 from fsid.terminal import Terminal
 
@@ -56,7 +57,7 @@ def experiment(
         camera: Noise profile of all data, trainings (to the highest ISO that is tested) and tests.
         set: Settings of the scenes, key=value, as for fsid generate; what all sources share are options.
         workers: Processes that render.
-        quiet: No progress bar.
+        quiet: No progress bar; warnings are printed.
     """
     from fsid.errors import FsidError
     from fsid.evaluate.experiment_config import scale_config
@@ -80,8 +81,7 @@ def experiment(
     given |= {"photos": str(photos.resolve()) if photos else ("" if kind == "real-vs-synthetic" else None)}
     given |= {"tests": tuple(str(folder.resolve()) for folder in test)}
     config = replace(scale_config(kind, scale), **{k: v for k, v in given.items() if v is not None})
-    console = Terminal(stderr=True, quiet=quiet, markup=False)
-    say = partial(console.print, soft_wrap=True)
-    report = run_experiment(output, config, partial(progress_bar, quiet=quiet), workers=workers, note=say)
+    report = run_experiment(output, config, partial(progress_bar, quiet=quiet), workers=workers, note=note)
     rows = json.loads((output / "results.json").read_text(encoding="utf-8"))
-    say(f"{report}: {len(rows)} rows")
+    console = Terminal(stderr=True, quiet=quiet, markup=False)
+    console.print(f"{report}: {len(rows)} rows", soft_wrap=True)

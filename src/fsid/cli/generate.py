@@ -6,7 +6,6 @@ import os
 import shlex
 import shutil
 import sys
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -15,6 +14,7 @@ from tyro.conf import Positional
 from fsid.cli.arguments import overrides
 from fsid.cli.iso_notes import note_extrapolation
 from fsid.cli.libraries import read_libraries
+from fsid.cli.notes import note
 from fsid.cli.progress import progress_bar
 from fsid.errors import FsidError
 from fsid.plurals import counted
@@ -83,7 +83,7 @@ def generate(
         only: Key of one sample (00000012), or the path of its KEY.json: make that one alone, as loose
             files in OUT, which are no part of the dataset.
         dry_run: Measure a few pairs, print the estimated time, size and number of shards, and write nothing.
-        quiet: No progress bar.
+        quiet: No progress bar; warnings are printed.
     """
     from fsid.config import given_keys
     from fsid.dataset import (
@@ -115,16 +115,15 @@ def generate(
     check_given(settings, given_keys(given))
     if only:
         stated = settings if config or given else None
-        say = partial(console.print, soft_wrap=True, markup=False)
-        for path in make_only(out, only, stated, seed, note=say):
-            say(str(path))
+        for path in make_only(out, only, stated, seed, note=note):
+            console.print(str(path), soft_wrap=True, markup=False)
         return
     if count is None or count < 1:
         raise FsidError("--count: say how many pairs the dataset is to have, at least 1")
     seed = seed or 0
     workforce = Workforce(workers, ray, workers_per_gpu)
     check_settings(settings)  # before a library is read
-    note_extrapolation(settings.cameras, *settings.iso_range, quiet=quiet)
+    note_extrapolation(settings.cameras, *settings.iso_range)
     if not settings.images:
         read_libraries(settings.scene, quiet=quiet)
     dataset = dataset_config(settings, seed)

@@ -36,7 +36,7 @@ def inspect(
             distance of the two halves of the reference, by chance alone: the more pictures, the stricter.
         out: Folder for statistics.json and statistics.png.
         limit: Largest number of pictures to measure of each set, evenly spaced.
-        quiet: No progress bar.
+        quiet: No progress bar; warnings are printed.
     """
     from fsid.dataset.inspect import inspect as inspect_sets
     from fsid.dataset.inspect import inspection_json

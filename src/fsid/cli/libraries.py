@@ -24,23 +24,23 @@ def read_libraries(config: SceneConfig, *, quiet: bool) -> None:
     for folder in config.mesh_folders:
         with progress_bar(f"reading {folder}", "meshes", quiet=quiet) as progress:
             meshes = survey_meshes(folder, config.mesh_folders_cc0_only, progress)
-        _tell(f"{folder}: {counted(len(meshes.usable), 'mesh')}", meshes.skipped, quiet=quiet)
+        _tell(f"{folder}: {counted(len(meshes.usable), 'mesh')}", meshes.skipped)
     for folder in config.texture_folders:
         with progress_bar(f"reading {folder}", "texture sets", quiet=quiet) as progress:
             sets = survey_textures(folder, progress)
-        _tell(f"{folder}: {counted(len(sets.usable), 'texture set')}", sets.skipped, quiet=quiet)
+        _tell(f"{folder}: {counted(len(sets.usable), 'texture set')}", sets.skipped)
     if config.panoramas:
         skies = survey_skies(config.panoramas)
-        _tell(f"{config.panoramas}: {counted(len(skies.usable), 'panorama')}", skies.skipped, quiet=quiet)
+        _tell(f"{config.panoramas}: {counted(len(skies.usable), 'panorama')}", skies.skipped)
 
 
-def _tell(found: str, skipped: Sequence[tuple[str, str]], *, quiet: bool) -> None:
+def _tell(found: str, skipped: Sequence[tuple[str, str]]) -> None:
     """Nothing where nothing was skipped."""
     from fsid.assets.file_names import PREFIX
 
     if skipped:
         name, reason = skipped[0]
-        Terminal(stderr=True, quiet=quiet).print(
+        Terminal(stderr=True).print(
             f"{found}, {len(skipped)} skipped, first {name.removeprefix(PREFIX)}: {reason}",
             style="yellow",
             soft_wrap=True,

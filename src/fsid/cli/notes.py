@@ -1,4 +1,4 @@
-"""One line to the user that is no error."""
+"""One line to the user that is no error. What warns of their data is said with --quiet, too."""
 
 from __future__ import annotations
 
@@ -7,6 +7,6 @@ from rich.text import Text
 from fsid.terminal import Terminal
 
 
-def note(line: str, *, quiet: bool = False) -> None:
-    """Print `line` on stderr; quiet: do not."""
-    Terminal(stderr=True, quiet=quiet).print(Text(f"note: {line}"), soft_wrap=True)
+def note(line: str) -> None:
+    """Print `line` on stderr."""
+    Terminal(stderr=True).print(Text(f"note: {line}"), soft_wrap=True)

@@ -37,7 +37,7 @@ def preview(
         width: Width of one scene in pixels (default 480).
         height: Height of one scene in pixels (default 270).
         variant: What varies between scenes (default full).
-        quiet: No progress bar.
+        quiet: No progress bar; warnings are printed.
     """
     from fsid.config import given_keys
     from fsid.dataset import (

@@ -57,7 +57,7 @@ def testset(
         height: Height of a picture in pixels (simulate; default 768).
         material: Materials to draw (simulate; default all ten).
         seed: Seed of drawing, white balance, colour matrix and noise (photos, simulate; default 0).
-        quiet: No progress bar.
+        quiet: No progress bar; warnings are printed.
     """
     from fsid.evaluate import burst_testset, photo_testset, simulated_testset
 
@@ -89,7 +89,7 @@ def testset(
                 folders, output, camera=camera, isos=isos, luxes=lux, progress=progress, **given
             )
     if camera:
-        note_files(camera, made.captures(output), quiet=quiet)
+        note_files(camera, made.captures(output))
 
 
 def _check_folders(source: str, folders: tuple[Path, ...]) -> None:

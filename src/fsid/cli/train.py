@@ -39,7 +39,7 @@ def train(
             (eight GPUs).
         set: Single settings, for example --set steps=20000 batch=16 learning_rate=1e-3.
         resume: Continue the training in the folder with the settings that it has there.
-        quiet: No progress line.
+        quiet: No progress line; warnings are printed.
     """
     from fsid.dataset.index import task_of
     from fsid.denoise import train as train_network
@@ -50,11 +50,12 @@ def train(
         raise FsidError("--resume: takes the settings of the run; leave out --config and --set")
     settings = train_config(output / CONFIG_FILE if resume else config, set)
     is_main = os.environ.get("RANK", "0") == "0"
-    note_extrapolation(settings.profiles, settings.iso_min, settings.iso_max, quiet=quiet or not is_main)
+    if is_main:
+        note_extrapolation(settings.profiles, settings.iso_min, settings.iso_max)
     task = task_of(data)
-    if task != "denoise":
+    if task != "denoise" and is_main:
         line = f"{data} holds pairs for {task}, but this trains a denoiser: it takes their clean images alone"
-        note(f"{line} and draws noise for them", quiet=quiet or not is_main)
+        note(f"{line} and draws noise for them")
     command = shlex.join(["fsid", *sys.argv[1:]])
     model = train_network(data, output, settings, resume=resume, quiet=quiet, command=command)
     if not quiet and is_main:

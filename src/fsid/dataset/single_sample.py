@@ -69,7 +69,7 @@ def _from_key(
         if found is not None:
             return _remake(found, f"{shard}: sample {index}")
         if any(out.glob("shard-*.tar")):
-            note(f"note: no shard of {out} has sample {sample_key(index)} yet; this is what it would be")
+            note(f"no shard of {out} has sample {sample_key(index)} yet; this is what it would be")
     config, seed = config or GenerateConfig(), seed or 0
     dataset_config(config, seed)  # names what does not exist
     with rendering(config) as renderer:

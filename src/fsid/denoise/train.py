@@ -80,11 +80,11 @@ def train(
 
     A run that is in `run_dir` already goes on from its checkpoint; it must have been started with the same
     config, but for what changes no bit (`run_folder`), and dataset, which may have grown or moved. resume:
-    insist that there is one. command: for the record of the run. progress(done, steps) is called in place of
-    the progress line. Under `torchrun` or `accelerate launch` each process draws batches of its own and
-    gradients are averaged. Raises FsidError for unusable data or settings, another run in `run_dir`, another
-    process at work there, or a training that diverges. Afterwards PyTorch's number of threads, its random
-    numbers on the CPU and an Accelerator of your own are what they were.
+    insist that there is one. quiet: print nothing. command: for the record of the run. progress(done, steps)
+    is called in place of what is printed. Under `torchrun` or `accelerate launch` each process draws batches
+    of its own and gradients are averaged. Raises FsidError for unusable data or settings, another run in
+    `run_dir`, another process at work there, or a training that diverges. Afterwards PyTorch's number of
+    threads, its random numbers on the CPU and an Accelerator of your own are what they were.
     """
     check_kind(config, TrainConfig, "train_config makes one of a file, a name or settings")
     data_dir, run_dir = Path(data_dir), Path(run_dir)

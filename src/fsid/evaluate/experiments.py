@@ -91,7 +91,7 @@ def _run(
 ) -> Path:
     overlap = _overlap(config, workers)
     if overlap:
-        note(f"note: {overlap}")
+        note(overlap)
     testsets = _testsets(out, config, bar)
     rows, images = _measured(out / "baselines", [NOISY, CLASSICAL], testsets, bar)
     for source, seed in product(SOURCES[config.kind], config.seeds):
