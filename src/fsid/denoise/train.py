@@ -14,6 +14,7 @@ bits as an undisturbed one.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, nullcontext
 from dataclasses import replace
@@ -42,6 +43,9 @@ from fsid.denoise.validate import held_out
 from fsid.errors import FsidError, check_kind
 from fsid.files import check_folder, held
 from fsid.terminal import Terminal
+
+_SHARDED = {"DEEPSPEED": "DeepSpeed", "FSDP": "FSDP", "MEGATRON_LM": "Megatron-LM"}
+"""What `accelerate launch` says to its processes, and the name of it."""
 
 
 @contextmanager
@@ -91,6 +95,7 @@ def train(
     config = sizes_as_begun(run_dir, config)
     if config.threads:
         torch.set_num_threads(config.threads)
+    _check_accelerate()
     gpu = torch.cuda.is_available()
     accelerator = Accelerator(cpu=not gpu, mixed_precision="bf16" if gpu else "no", dynamo_backend="no")
     is_main = accelerator.is_main_process
@@ -164,6 +169,16 @@ def _note_nothing_held_out(data_dir: Path) -> None:
     why = "none is held out for validation, which needs five scenes or pictures when a training begins"
     line = f"note: {data_dir}: {why}; {MODEL_FILE} is the network at the last step"
     Terminal(stderr=True).print(Text(line), soft_wrap=True)
+
+
+def _check_accelerate() -> None:
+    """FsidError where the configuration of accelerate would cut the network into parts."""
+    for name, title in _SHARDED.items():
+        if os.environ.get(f"ACCELERATE_USE_{name}", "").lower() == "true":
+            raise FsidError(
+                f"{title}: the configuration of accelerate asks for it, but fsid train keeps the whole "
+                f"network in every process; launch with torchrun or accelerate launch --multi_gpu instead"
+            )
 
 
 def _patch_config(config: TrainConfig) -> PatchConfig:
