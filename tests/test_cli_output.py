@@ -255,6 +255,18 @@ def test_a_help_breaks_lines_where_its_terminal_does(capsys: pytest.CaptureFixtu
     assert "network (nafnet-small); may be given several times" in text
 
 
+@pytest.mark.parametrize("command", ["generate", "preview"])
+def test_the_paper_s_names_of_variants_are_in_the_help_alone(
+    command: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """No option takes them, so the guide to the settings calls variants what the option calls them."""
+    with pytest.raises(SystemExit):
+        cli.main([command, "--help"])
+    assert "v1 to v4" in " ".join(capsys.readouterr().out.split())
+    guide = Path(__file__).resolve().parents[1] / "docs" / "scenes.md"
+    assert not re.search(r"\bv[1-4]\b", guide.read_text(encoding="utf-8"))
+
+
 def test_the_version_is_told(capsys: pytest.CaptureFixture[str]) -> None:
     cli.main(["--version"])
     assert capsys.readouterr().out == f"fsid {__version__}\n"

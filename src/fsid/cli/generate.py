@@ -66,7 +66,8 @@ def generate(
         set: Single settings, for example --set iso_range=[800,3200] scene.objects=[20,30] crops=4.
         width: Width of a frame in pixels (default 1920).
         height: Height of a frame in pixels (default 1080).
-        variant: What varies between scenes: objects, materials, both, or everything (default full).
+        variant: What varies between scenes: objects, materials, both, or everything (default full); the paper
+            calls them v1 to v4.
         task: What the pairs are for (default denoise). super-resolution: KEY.noisy.dng has half the width and
             height (--set scale=4: a quarter), deblur: camera and objects move while the shutter is open;
             KEY.degraded.dng is KEY.noisy.dng without noise. burst: KEY.noisy1.dng ... are further frames,

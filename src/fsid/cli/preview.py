@@ -36,7 +36,7 @@ def preview(
         set: Single settings, key=value, of what the picture shows.
         width: Width of one scene in pixels (default 480).
         height: Height of one scene in pixels (default 270).
-        variant: What varies between scenes (default full).
+        variant: What varies between scenes (default full); v1 to v4 of the paper.
         quiet: No progress bar; warnings are printed.
     """
     from fsid.config import given_keys
