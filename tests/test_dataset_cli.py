@@ -182,6 +182,25 @@ def test_panoramas_that_are_skipped_are_counted_and_the_first_is_named(
     assert f"{tmp_path}: 1 panorama, 1 skipped, first {tmp_path}/page.hdr: is no Radiance" in said
 
 
+def test_pictures_of_formats_that_are_not_read_are_counted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], refused: Callable[..., str]
+) -> None:
+    (folder := tmp_path / "photos").mkdir()
+    for name in ("a.HEIC", "b.heic", "c.gif", "._d.avif"):
+        (folder / name).touch()
+    told = "left out are 1 .gif, 2 .heic, which FSID does not read: save them as .png or .jpg"
+    command = ["generate", tmp_path / "out", "--images", folder, "--count", "1", "--quiet"]
+    for refusal in (refused(*command), refused("testset", "photos", folder, "-o", tmp_path / "set")):
+        assert f"; {told}" in refusal
+    noise = np.random.default_rng(0).integers(0, 255, (64, 64, 3), np.uint8)
+    Image.fromarray(noise).save(folder / "e.png")
+    main([*map(str, command), "--width", "32", "--height", "32"])
+    assert capsys.readouterr().err == f"note: {folder}: {told}\n"
+    main(["testset", "photos", str(folder), "-o", str(tmp_path / "set"), "--iso", "800", "--quiet"])
+    main(["inspect", str(folder), "--quiet"])
+    assert capsys.readouterr().err.count(f"note: {folder}: {told}\n") == 2
+
+
 def test_folders_are_surveyed_once_and_workers_are_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

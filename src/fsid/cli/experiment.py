@@ -11,7 +11,7 @@ from typing import Any, Literal
 from tyro.conf import Positional
 
 from fsid.cli.arguments import Output
-from fsid.cli.notes import note
+from fsid.cli.notes import note, note_unread
 from fsid.cli.progress import progress_bar
 from fsid.terminal import Terminal
 
@@ -81,6 +81,7 @@ def experiment(
     given |= {"photos": str(photos.resolve()) if photos else ("" if kind == "real-vs-synthetic" else None)}
     given |= {"tests": tuple(str(folder.resolve()) for folder in test)}
     config = replace(scale_config(kind, scale), **{k: v for k, v in given.items() if v is not None})
+    note_unread((*test, photos))
     report = run_experiment(output, config, partial(progress_bar, quiet=quiet), workers=workers, note=note)
     rows = json.loads((output / "results.json").read_text(encoding="utf-8"))
     console = Terminal(stderr=True, quiet=quiet, markup=False)

@@ -14,7 +14,7 @@ from tyro.conf import Positional
 from fsid.cli.arguments import overrides
 from fsid.cli.iso_notes import note_extrapolation
 from fsid.cli.libraries import read_libraries
-from fsid.cli.notes import note
+from fsid.cli.notes import note, note_unread
 from fsid.cli.progress import progress_bar
 from fsid.errors import FsidError
 from fsid.plurals import counted
@@ -125,6 +125,7 @@ def generate(
     workforce = Workforce(workers, ray, workers_per_gpu)
     check_settings(settings)  # before a library is read
     note_extrapolation(settings.cameras, *settings.iso_range)
+    note_unread((settings.images,))
     if not settings.images:
         read_libraries(settings.scene, quiet=quiet)
     dataset = dataset_config(settings, seed)

@@ -8,6 +8,7 @@ from pathlib import Path
 from rich.table import Table
 from tyro.conf import Positional
 
+from fsid.cli.notes import note_unread
 from fsid.cli.progress import progress_bar
 from fsid.cli.tables import print_table
 from fsid.plurals import counted
@@ -49,6 +50,7 @@ def inspect(
         check_folder(out)
     if other is not None and reference is None:
         raise FsidError("--other needs --reference: it says how far two real sets lie apart")
+    note_unread((data, reference, other))
     with progress_bar("pictures", "pictures", quiet=quiet) as progress:
         found = inspect_sets(data, reference, other, limit=limit, progress=progress)
     table = Table(title=f"{data}: {counted(found.pictures, 'picture')}")

@@ -11,6 +11,7 @@ from tyro.conf import Positional
 
 from fsid.cli.arguments import Output
 from fsid.cli.iso_notes import note_files
+from fsid.cli.notes import note_unread
 from fsid.cli.progress import progress_bar
 from fsid.cli.tables import print_table
 from fsid.errors import FsidError
@@ -83,6 +84,7 @@ def testset(
             made, found = burst_testset(folders[0], output, camera=camera, progress=progress, **given)
         print_table(_table(found))
     else:
+        note_unread(folders)
         isos = iso if iso or lux else DEFAULT_ISOS
         with progress_bar("photographs", "photographs", quiet=quiet) as progress:
             made = photo_testset(

@@ -11,7 +11,7 @@ from tyro.conf import Positional
 
 from fsid.cli.arguments import Output
 from fsid.cli.iso_notes import note_extrapolation
-from fsid.cli.notes import note
+from fsid.cli.notes import note, note_unread
 from fsid.errors import FsidError
 from fsid.terminal import Terminal
 
@@ -52,6 +52,7 @@ def train(
     is_main = os.environ.get("RANK", "0") == "0"
     if is_main:
         note_extrapolation(settings.profiles, settings.iso_min, settings.iso_max)
+        note_unread((settings.validation_photos,))
     task = task_of(data)
     if task != "denoise" and is_main:
         line = f"{data} holds pairs for {task}, but this trains a denoiser: it takes their clean images alone"

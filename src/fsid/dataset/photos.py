@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import struct
 import warnings
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -23,6 +24,8 @@ _BLACK = 0.02  # sRGB-encoded; a photograph that is darker everywhere shows noth
 PHOTO_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".bmp")
 _FORMATS = ("PNG", "JPEG", "TIFF", "WEBP", "BMP")
 """Whatever a file is called: others Pillow may hand to programs of their own, PostScript to Ghostscript."""
+_OTHER_SUFFIXES = (".heic", ".heif", ".avif", ".gif", ".jxl", ".jp2")
+"""Of pictures that nothing here reads."""
 _SUBFILE, _SUB_PAGES = 254, 330
 _REDUCED = (1, 3, 5, 7)
 """Tags of TIFF 6.0, and what the first may say."""
@@ -35,7 +38,7 @@ def find_photos(folder: str | Path) -> list[Path]:
         raise FsidError(f"{folder}: is not a folder of photographs")
     photos = files_inside(folder, PHOTO_SUFFIXES)
     if not photos:
-        where = deeper(folder, PHOTO_SUFFIXES)
+        where = deeper(folder, PHOTO_SUFFIXES) or unread(folder)
         raise FsidError(f"{folder}: holds no photograph ({', '.join(PHOTO_SUFFIXES)}){where}")
     return photos
 
@@ -44,6 +47,15 @@ def files_inside(folder: Path, suffixes: tuple[str, ...]) -> list[Path]:
     """The files directly inside `folder` that end so, sorted; hidden ones ("._a.jpg" of macOS) left out."""
     files = (path for path in folder.iterdir() if not path.name.startswith("."))
     return sorted(path for path in files if path.suffix.lower() in suffixes)
+
+
+def unread(folder: Path) -> str:
+    """In words, how many pictures directly inside `folder` are of formats that are not read; "" for none."""
+    counts = Counter(path.suffix.lower() for path in files_inside(folder, _OTHER_SUFFIXES))
+    if not counts:
+        return ""
+    formats = ", ".join(f"{count} {suffix}" for suffix, count in sorted(counts.items()))
+    return f"; left out are {formats}, which FSID does not read: save them as .png or .jpg"
 
 
 def deeper(folder: Path, suffixes: tuple[str, ...]) -> str:

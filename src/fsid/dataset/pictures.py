@@ -24,6 +24,7 @@ from fsid.dataset.photos import (
     deeper,
     files_inside,
     read_photo,
+    unread,
 )
 from fsid.errors import FsidError, refuse_any
 from fsid.files import check_file
@@ -56,7 +57,8 @@ def find_pictures(folder: str | Path) -> list[Path]:
     suffixes = (*PHOTO_SUFFIXES, EXR_SUFFIX)
     pictures = files_inside(folder, suffixes)
     if not pictures:
-        raise FsidError(f"{folder}: holds no picture ({', '.join(suffixes)}){deeper(folder, suffixes)}")
+        where = deeper(folder, suffixes) or unread(folder)
+        raise FsidError(f"{folder}: holds no picture ({', '.join(suffixes)}){where}")
     return pictures
 
 
