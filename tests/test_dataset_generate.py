@@ -163,6 +163,17 @@ def test_what_is_read_again_at_the_end_has_progress(photos: Path, scenes: Path, 
     assert read == list(range(1, len(shards) + 1))
 
 
+def test_looking_at_what_is_there_has_progress(photos: Path, tmp_path: Path):
+    """It takes half a minute where there are many shards, and ended in a bar that was full at once."""
+    told: list[tuple[int, int]] = []
+    config = small("width=64", "height=48", f"images={photos}")
+    for shards in (0, 2):
+        generate(tmp_path, config, count=4, shard_size=2, looking=lambda *now: told.append(now))
+        assert told == [(number + 1, 2) for number in range(shards)]
+    assert pairs_to_make(tmp_path, dataset_config(config, 0, 2), 4, lambda *now: told.append(now)) == (0, 0)
+    assert told == [(1, 2), (2, 2)] * 2
+
+
 def test_another_seed_gives_other_pictures(photos: Path, tmp_path: Path):
     made = []
     for seed in (7, 8):

@@ -6,6 +6,7 @@ import os
 import shlex
 import shutil
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -15,7 +16,7 @@ from fsid.cli.arguments import overrides
 from fsid.cli.iso_notes import note_extrapolation
 from fsid.cli.libraries import read_libraries
 from fsid.cli.notes import note, note_unread
-from fsid.cli.progress import progress_bar
+from fsid.cli.progress import Bar, progress_bar
 from fsid.errors import FsidError
 from fsid.plurals import counted
 from fsid.terminal import Terminal
@@ -28,7 +29,7 @@ Task = Literal["denoise", "super-resolution", "deblur", "burst"]
 RendererName = Literal["raster", "reference"]
 Quality = Literal["high", "fast"]
 _QUICKLY_READ = 100
-"""Readings of shards, of which each has two, up to which they have no bar."""
+"""Shards that are looked at, or readings of shards, of which each has two, up to which they have no bar."""
 
 
 def generate(
@@ -130,7 +131,8 @@ def generate(
         read_libraries(settings.scene, quiet=quiet)
     dataset = dataset_config(settings, seed)
     if dry_run:
-        Terminal(markup=False).print(_plan(out, settings, dataset, count, workforce), soft_wrap=True)
+        plan = _plan(out, settings, dataset, count, workforce, quiet=quiet)
+        Terminal(markup=False).print(plan, soft_wrap=True)
     else:
         if not is_begun(out, dataset):
             _check_sources(settings, count, workforce, quiet=quiet)
@@ -162,12 +164,9 @@ def _make(
     """Generate behind a progress bar; how many pairs are new."""
     from fsid.dataset import generate as generate_dataset
 
-    with progress_bar("pairs", "pairs", quiet=quiet) as progress:
+    with progress_bar("looking at shards", "shards", quiet=quiet) as looking:
+        progress = looking.then("pairs", "pairs")
         reading = progress.then("checking the whole", "shards")
-
-        def finishing(done: int, total: int) -> None:
-            if total > _QUICKLY_READ:
-                reading(done, total)
 
         return generate_dataset(
             out,
@@ -177,18 +176,31 @@ def _make(
             workforce=workforce,
             progress=progress,
             lost=progress.failed,
-            finishing=finishing,
+            finishing=_of_many(reading),
+            looking=_of_many(looking),
             command=shlex.join(["fsid", *sys.argv[1:]]),
         )
 
 
+def _of_many(bar: Bar) -> Callable[[int, int], None]:
+    """Moves `bar` where there are more than `_QUICKLY_READ`."""
+    return lambda done, total: bar(done, total) if total > _QUICKLY_READ else None
+
+
 def _plan(
-    out: Path, settings: GenerateConfig, dataset: DatasetConfig, count: int, workforce: Workforce
+    out: Path,
+    settings: GenerateConfig,
+    dataset: DatasetConfig,
+    count: int,
+    workforce: Workforce,
+    *,
+    quiet: bool,
 ) -> str:
     """What a dry run says: time, size and number of shards of what `out` lacks, from a few pairs."""
     from fsid.dataset import estimate, pairs_to_make
 
-    left, shards = pairs_to_make(out, dataset, count)
+    with progress_bar("looking at shards", "shards", quiet=quiet) as looking:
+        left, shards = pairs_to_make(out, dataset, count, _of_many(looking))
     if not left:
         return f"{out}: has {counted(count, 'pair')} already; nothing was written."
     costs = estimate(settings, count=left, seed=dataset.seed, workforce=workforce, shards=shards)

@@ -111,6 +111,7 @@ def generate(
     workforce: Workforce | None = None,
     lost: Callable[[str], None] = lambda line: None,
     finishing: Callable[[int, int], None] = lambda done, total: None,
+    looking: Callable[[int, int], None] = lambda done, total: None,
     command: str = "",
 ) -> int:
     """Make the samples 0 .. count-1 that `out` lacks; returns how many were made.
@@ -120,7 +121,8 @@ def generate(
     `config.pairs_per_frame`; 0 takes the first one from 16 on. progress(done, total): samples, called at
     the start and after every shard. lost(line): called for every worker that died; its shard is made again by
     another. finishing(done, total): shards that are read again when all are there, for near-duplicates and
-    for the dataset card, README.md. command: for the card.
+    for the dataset card, README.md. looking(done, total): shards of which it is seen, at the start, whether
+    they are whole. command: for the card.
     Raises FsidError where `out` already holds a dataset of another configuration or seed, where another
     process fills it, where the disk refuses, or where a shard kills its worker again and again.
     """
@@ -130,7 +132,7 @@ def generate(
     out, workforce = Path(out), workforce or Workforce(workers)
     dataset = dataset_config(config, seed, shard_size)
     with _locked(out):
-        begun, todo = _check_own(out, dataset), list(_missing(out, dataset, count))
+        begun, todo = _check_own(out, dataset), list(_missing(out, dataset, count, looking))
         if todo or not begun:
             check_card(out)
         if not begun:
@@ -157,14 +159,19 @@ def generate(
     return total
 
 
-def pairs_to_make(out: str | Path, dataset: DatasetConfig, count: int) -> tuple[int, int]:
+def pairs_to_make(
+    out: str | Path,
+    dataset: DatasetConfig,
+    count: int,
+    looking: Callable[[int, int], None] = lambda done, total: None,
+) -> tuple[int, int]:
     """How many of the first `count` pairs `out` lacks, in whole frames, and in how many shards they are.
 
-    FsidError where it holds others.
+    looking: as of `generate`. FsidError where it holds others.
     """
     out = Path(out)
     _check_own(out, dataset)
-    missing = list(_missing(out, dataset, count))
+    missing = list(_missing(out, dataset, count, looking))
     if missing:
         check_card(out)
     return sum(len(shard.indices) for shard in missing), len(missing)
@@ -211,12 +218,18 @@ def _unbroken(out: Path, size: int) -> Iterator[Path]:
             return
 
 
-def _missing(out: Path, dataset: DatasetConfig, count: int) -> Iterator[_Shard]:
-    size = dataset.shard_size
-    for number, start in enumerate(range(0, count, size)):
+def _missing(
+    out: Path, dataset: DatasetConfig, count: int, looking: Callable[[int, int], None]
+) -> Iterator[_Shard]:
+    size, looks = dataset.shard_size, False
+    starts = range(0, count, size)
+    for number, start in enumerate(starts):
         indices = range(start, min(start + size, count))
         path = shard_path(out, number)
         there = count_whole(path) if path.exists() else 0
+        looks = looks or there > 0  # where there is none yet, it takes no time
+        if looks:
+            looking(number + 1, len(starts))
         if there < len(indices):
             kept = there - there % dataset.generate.pairs_per_frame
             yield _Shard(path, kept, indices[kept:], dataset)
