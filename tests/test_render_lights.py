@@ -987,6 +987,29 @@ def test_ambient_light_of_a_room_is_as_stated_on_average_and_what_its_walls_give
     assert sideways[5] > 1.5 * sideways[4] > 0
 
 
+@pytest.mark.parametrize("lamp", [0.0, 5.0, 50.0])
+def test_a_sky_gives_each_axis_the_light_of_its_half(lamp: float) -> None:
+    """E / pi by summing texels: of a slope around the horizon, of stripes finer than the grid, of a disc
+    brighter than what is looked up, and of a thousand lamps of one texel, as of a town at night."""
+    picture, _ = sky_of((TO_SUN, 0.2, (0.3, 0.2, 0.1)))
+    elevation, azimuth = angles(len(picture))
+    picture *= (1 + 0.5 * np.cos(azimuth - 1))[:, None].astype(np.float32)
+    picture[::2] *= 1.5
+    picture[1::2] *= 0.5
+    picture[:, ::2] *= 0.7
+    picture[:, 1::2] *= 1.3
+    up, around = np.meshgrid(elevation, azimuth, indexing="ij")
+    picture[np.random.default_rng(0).random(up.shape) < 0.003 * np.cos(up)] += np.float32(lamp)
+    assert picture.max() > 15 * picture.mean()
+    towards = np.stack([np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)], -1)
+    solid = np.cos(up) * (np.pi / len(picture)) ** 2
+    found = light_sky(picture).ambient
+    for side in range(6):
+        cosine = np.maximum((1 - 2 * (side % 2)) * towards[..., side // 2], 0)
+        wanted = (picture * (cosine * solid)[..., None]).sum((0, 1)) / np.pi
+        np.testing.assert_allclose(found[side], wanted, rtol=0.02)
+
+
 def test_the_twelve_strongest_lamps_shine_strongest_first() -> None:
     """Of radiance L and surface A the intensity L A / 4, at the middle, as large as it is, all around alike;
     what shines of the background is none of them."""

@@ -76,14 +76,14 @@ def light_sky(panorama: np.ndarray) -> Room:
     """panorama: (H, 2 H, 3) as `fsid.render.sky.panorama`."""
     half = np.full(3, SKY_HALF_M)
     directions = np.stack([_grid(half, np.zeros(3), side, FINE_GRID)[0] for side in range(6)]) / SKY_HALF_M
-    coarse = panorama
+    most = np.float32(_PEAK) * panorama.mean()
+    coarse = np.minimum(panorama, most)
     while len(coarse) > 2 * FINE_GRID and len(coarse) % 2 == 0:
         coarse = (coarse[::2] + coarse[1::2]) / 2
         coarse = (coarse[:, ::2] + coarse[:, 1::2]) / 2
     norm = np.linalg.norm(directions, axis=-1)
     unit_direction = directions / norm[..., None]
-    most = np.float32(_PEAK) * panorama.mean()
-    radiance = look_up(np.minimum(coarse, most), unit_direction)
+    radiance = look_up(coarse, unit_direction)
     _add_peaks(radiance, panorama, most, (2 / FINE_GRID) ** 2 / norm**3)
     shares = _shares(np.ones(3), np.zeros(3))
     return Room(half, np.zeros(3), np.einsum("asij,sijc->ac", shares, radiance), radiance)
