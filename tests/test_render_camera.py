@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -9,6 +10,7 @@ import moderngl
 import numpy as np
 import pytest
 from scipy.ndimage import center_of_mass, map_coordinates
+from scipy.spatial.transform import Rotation
 
 from fsid.errors import FsidError
 from fsid.render import Renderer
@@ -16,9 +18,10 @@ from fsid.render.camera import lens_of
 from fsid.render.drawable import Drawable, View
 from fsid.render.exposure import Shot, shots_of
 from fsid.render.flow import flow_between
+from fsid.render.frame import Frame
 from fsid.scene import SceneConfig, sample
 from fsid.scene.distortion import distorted, fold_radius, rays_of, stretch_of, undistorted
-from fsid.scene.model import Camera, Distortion, Motion, Transform
+from fsid.scene.model import ZERO, Camera, Distortion, Motion, Transform
 from render_scenes import FROM_ABOVE, block, draw, grid, lambertian, plain, point_light, sphere, view
 
 ONE = (1.0, 1.0, 1.0)
@@ -248,15 +251,15 @@ def test_flow_meets_the_same_point_in_the_other_image(renderer: Renderer, lens: 
 
 def test_flow_of_what_moves_and_turns_is_that_of_its_motion(renderer: Renderer) -> None:
     """By hand, from depth: 0.2 s of 0.8 and 0.2 m/s and of 60 degrees/s about the ball's upright axis; into
-    an image of twice the size, where what stands still is at twice the place. Behind a camera there is none.
+    an image of twice the size and a longer lens. Behind a camera there is none.
     """
     what = moved_view(width=96, height=96, time_s=0.1)
-    there = replace(what.camera, width=192, height=192, time_s=0.3)
+    there = replace(what.camera, width=192, height=192, fov_deg=40.0, time_s=0.3)
     frame = draw(renderer, what)
     cameras = [(camera, lens_of(camera), camera.time_s) for camera in (what.camera, there)]
     flow = flow_between(frame, what.drawables, *cameras, LABEL_SAMPLE)
     rows, columns = np.mgrid[0:96, 0:96] + LABEL_SAMPLE
-    tangent = np.tan(np.radians(30))
+    tangent, narrow = np.tan(np.radians((30, 20)))
     x = (columns / 48 - 1) * tangent * frame.depth
     y = -(rows / 48 - 1) * tangent * frame.depth
     centre = np.array([[-0.3 + 0.8 * t, 0.1 + 0.2 * t] for t in (0.1, 0.3)])
@@ -264,12 +267,13 @@ def test_flow_of_what_moves_and_turns_is_that_of_its_motion(renderer: Renderer) 
     right, up = x - centre[0, 0], y - centre[0, 1]
     x1 = np.cos(turn) * right - np.sin(turn) * up + centre[1, 0]
     y1 = np.sin(turn) * right + np.cos(turn) * up + centre[1, 1]
-    moved = np.stack([x1 / frame.depth / tangent + 1, -y1 / frame.depth / tangent + 1], -1) * 96
-    still = np.stack([columns, rows], -1)
+    moved = np.stack([x1 / frame.depth / narrow + 1, -y1 / frame.depth / narrow + 1], -1) * 96
+    seen = np.stack([columns, rows], -1)
+    still = (seen - 48) * 2 * tangent / narrow + 96
     ball = frame.object_id == 1
     assert 300 < ball.sum() < 3000
-    np.testing.assert_allclose(flow[ball], (moved - still)[ball], atol=0.01)
-    np.testing.assert_allclose(flow[~ball], still[~ball], atol=0.01)
+    np.testing.assert_allclose(flow[ball], (moved - seen)[ball], atol=0.01)
+    np.testing.assert_allclose(flow[~ball], (still - seen)[~ball], atol=0.01)
     up_there = replace(there, target_m=(0.0, 0.0, 5.0))
     behind = flow_between(frame, what.drawables, cameras[0], (up_there, lens_of(up_there), 0.3), LABEL_SAMPLE)
     assert np.isnan(behind).all()
@@ -437,12 +441,33 @@ def test_what_comes_into_the_picture_late_leaves_no_ghosts(renderer: Renderer) -
     assert row.max() < 1.4 * row.min()
 
 
-def test_a_camera_that_makes_no_sense_is_named() -> None:
-    for change in ({"focus_m": 0.0}, {"aperture_m": -1.0}, {"exposure_s": -1.0}):
-        with pytest.raises(FsidError, match=r"scene\.cameras"):
-            lens_of(replace(FROM_ABOVE, **change))
-    with pytest.raises(FsidError, match="chromatic_aberration"):
-        lens_of(replace(FROM_ABOVE, chromatic_aberration=(0.2, 0.0)))
+@pytest.mark.parametrize(
+    ("key", "good", "bad"),
+    [
+        ("fov_deg", (0.1, 174.9), (-10.0, 0.0, 175.0, float("nan"))),
+        ("exposure_s", (0.0, 10.0), (-1.0,)),
+        ("aperture_m", (0.0, 10.0), (-1.0,)),
+        ("focus_m", (0.01, 1e6), (-1.0, 0.0)),
+        ("softness_px", (0.0, 50.0), (-0.1, 50.1)),
+        ("sharpening", (0.0, 5.0), (-0.1, 5.1)),
+        ("colour_contrast", ((-0.5, 0.5),), ((0.51, 0.0), (0.0, -0.51))),
+        ("chromatic_aberration", ((-0.049, 0.049),), ((0.05, 0.0), (0.0, -0.05))),
+        ("target_m", ((0.0, 0.1, 0.0),), (FROM_ABOVE.position_m, (0.0, 1.0, 2.0))),
+    ],
+)
+def test_a_camera_that_makes_no_sense_is_named(key: str, good: Sequence, bad: Sequence) -> None:
+    for value in good:
+        lens_of(replace(FROM_ABOVE, **{key: value}))
+    for value in bad:
+        with pytest.raises(FsidError, match=rf"scene\.cameras: .*{key}"):
+            lens_of(replace(FROM_ABOVE, **{key: value}))
+
+
+def test_things_are_seen_from_two_centimetres_on(renderer: Renderer) -> None:
+    close = lambertian(grid(0.2), at=at(0.0, 0.0, FROM_ABOVE.position_m[2] - 0.025))
+    frame = draw(renderer, view(lambertian(grid(8.0), object_id=1), close, ambient=1.0))
+    assert (frame.object_id == 0).all()
+    np.testing.assert_allclose(frame.depth, 0.025, rtol=1e-4)
 
 
 def test_albedo_is_flat_where_the_material_is(renderer: Renderer) -> None:
@@ -466,3 +491,123 @@ def test_places_far_from_the_middle_of_the_lens_come_at_all_times() -> None:
     places = np.array([shot.lens_offset for shot in shots])
     for along in (np.hypot(*places.T), *places.T, places.sum(1), places @ (1, -1)):
         assert abs(np.corrcoef(times, along)[0, 1]) < 0.3
+
+
+def test_a_camera_is_where_its_velocity_and_spin_have_taken_it() -> None:
+    """About its own place and an axis of the world, seen from the middle of its exposure."""
+    camera = replace(FROM_ABOVE, position_m=(0.3, -1.5, 1.2), up=(0.0, 0.0, 1.0), time_s=0.4)
+    camera = replace(camera, velocity_m_s=(0.5, -0.2, 0.1), spin_deg_s=(0.0, 0.0, 150.0))
+    middle, later = lens_of(camera), lens_of(camera, 0.6)
+    np.testing.assert_allclose(middle.position, camera.position_m)
+    np.testing.assert_allclose(lens_of(camera, 0.4).rotation, middle.rotation)
+    np.testing.assert_allclose(later.position, (0.4, -1.54, 1.22))
+    quarter = Rotation.from_euler("z", 30, degrees=True)  # x towards y
+    np.testing.assert_allclose(later.rotation, quarter.apply(middle.rotation), atol=1e-12)
+    ahead = np.array((-0.3, 1.5, -1.2)) / np.linalg.norm((0.3, 1.5, 1.2))
+    np.testing.assert_allclose(middle.rotation[2], ahead)
+    np.testing.assert_allclose(np.cross(middle.rotation[0], middle.rotation[1]), -ahead)
+    assert middle.rotation[0, 2] == pytest.approx(0)
+    assert middle.rotation[1, 2] > 0
+
+
+@pytest.mark.parametrize("lens", [BARREL, PINCUSHION, FISHEYE])
+@pytest.mark.parametrize(("width", "height"), [(96, 64), (48, 80)])
+def test_what_a_lens_looks_up_is_as_fine_as_its_image(lens: Distortion, width: int, height: int) -> None:
+    """Where it stretches most to the right, by the derivative of its formula."""
+    camera = replace(FROM_ABOVE, width=width, height=height, fov_deg=70.0, distortion=lens)
+    seen, focal_px = lens_of(camera), width / 2 / np.tan(np.radians(35))
+    x, y = np.meshgrid(np.arange(width + 2) - (width + 1) / 2, np.arange(height + 2) - (height + 1) / 2)
+    points, step = undistorted(lens, np.stack([x, y], -1) / focal_px), np.array([1e-5, 0.0])
+    stretch = (distorted(lens, points + step) - distorted(lens, points - step))[..., 0].max() / 2e-5
+    assert 0.9 < stretch < 1.4
+    for px, focal in zip(seen.seen_px, seen.seen_focal, strict=True):
+        assert px % 2 == 0
+        assert 0.98 < px / 2 * focal / focal_px / stretch < 1.04
+
+
+def still_frame(camera: Camera, depth_m: float) -> Frame:
+    """What `shots_of` looks at of a frame: all at one depth, of no object."""
+    shape = camera.height, camera.width
+    return SimpleNamespace(depth=np.full(shape, depth_m, np.float32), object_id=np.full(shape, -1))
+
+
+def test_the_images_of_an_exposure_are_evenly_spaced_in_time_and_on_the_lens() -> None:
+    """Each at its time of the moving camera, for an equal part of the opening; what is in focus stays."""
+    camera = replace(FROM_ABOVE, width=96, height=64, time_s=2.0, exposure_s=0.3, aperture_m=0.4, focus_m=1.5)
+    camera = replace(camera, velocity_m_s=(1.0, 0.0, 0.0))
+    middle = Shot(lens_of(camera), 2.0, (0.25, -0.125))
+    shots = shots_of(camera, (), still_frame(camera, 2.0), middle, LABEL_SAMPLE, 64, 64)
+    count = len(shots)
+    focal_px = 48 / np.tan(np.radians(30))
+    assert count == round(0.3 * focal_px / 2.0 / 1.5) + 1  # neighbours are 1.5 pixels apart
+    np.testing.assert_allclose(np.diff([shot.time_s for shot in shots]), 0.3 / count)
+    assert np.mean([shot.time_s for shot in shots]) == pytest.approx(2.0)
+    focal = np.array(middle.lens.focal)
+    places = []
+    for shot in shots:
+        at_rest = np.add(camera.position_m, (shot.time_s - 2.0, 0, 0))
+        places.append((shot.lens.position - at_rest)[:2])
+        assert shot.lens.position[2] == pytest.approx(2.0)
+        assert shot.aperture_m == pytest.approx(0.4 / np.sqrt(count))
+        for x, y in ((0.0, 0.0), (0.3, -0.2)):  # in the plane of the focus, beside the camera's place
+            point = np.add(at_rest, (x, y, -1.5))
+            right, up, ahead = shot.lens.rotation @ (point - shot.lens.position)
+            seen = np.array([right, -up]) / ahead * focal + shot.seen_shift
+            np.testing.assert_allclose(seen, np.array([x, -y]) / 1.5 * focal + (0.5 / 96, -0.25 / 64))
+    distance = np.linalg.norm(places, axis=1)
+    assert distance.max() <= 0.2 * 1.1
+    assert np.mean(distance**2) == pytest.approx(0.2**2 / 2, rel=0.05)  # of an even disc
+    np.testing.assert_allclose(np.mean(places, axis=0), 0, atol=1e-9)
+
+
+def images_of(camera: Camera, *drawables: Drawable, frame: Frame | None = None, most: int = 400) -> int:
+    """How many images `shots_of` averages; of a floor 2 m before the camera where no frame is given."""
+    frame = frame or still_frame(camera, 2.0)
+    return len(shots_of(camera, drawables, frame, Shot(lens_of(camera), 0.0), LABEL_SAMPLE, most, most))
+
+
+def test_there_are_as_many_images_as_the_widest_blur_has_steps() -> None:
+    """1.5 pixels along a path; circles of 4 pixels in that of confusion; four at least, and as many as are
+    allowed."""
+    still = replace(FROM_ABOVE, exposure_s=0.5, height=48, time_s=3.0)
+    focal_px = 48 / np.tan(np.radians(30))
+    assert images_of(still) == 0
+    for speed, steps in ((1e-6, 4), (0.5, 8), (3.0, 43)):
+        moving = replace(still, velocity_m_s=(0.0, speed, 0.0))
+        assert images_of(moving) == steps == max(round(speed * 0.5 * focal_px / 2 / 1.5) + 1, 4)
+        assert images_of(replace(moving, exposure_s=0.0)) == 0
+    assert images_of(moving, most=16) == 16
+    for turn_deg in (20.0, 90.0, 360.0):  # about the middle of the picture: the path of its corners
+        turning = replace(still, spin_deg_s=(0.0, 0.0, turn_deg / 0.5))
+        path_px = np.radians(turn_deg) * np.hypot(47, 23)
+        assert images_of(turning) == pytest.approx(path_px / 1.5 + 1, rel=0.03)
+    opened = replace(still, aperture_m=0.5, focus_m=1.0)
+    across_px = 0.5 * focal_px * (1 / 1.0 - 1 / 2.0)
+    assert images_of(opened) == round(np.pi / 4 * (across_px / 4) ** 2) + 1 == 22
+    assert images_of(opened, most=9) == 9
+
+
+def test_the_path_of_one_small_thing_counts_be_it_seen_or_not() -> None:
+    """Where the middle of the exposure does not show it, that of its box while it is in the picture, which
+    with a lens may reach farther than without; its scale and turn belong to it."""
+    camera = replace(FROM_ABOVE, exposure_s=0.5, width=48, height=32)
+    turned = Transform(ZERO, (0.0, 0.0, 90.0), (3.0, 1.0, 1.0))
+    half = block((0.1, 0.1, 0.1))
+    half = replace(half, vertices=half.vertices + np.float32([0.05, 0.0, 0.0]))
+    slab = lambertian(half, at=turned)  # 0.3 m long from its place on, along y
+    slab = replace(slab, object_id=1, motion=Motion(velocity_m_s=(2.0, 0.0, 0.0)))
+    frame = still_frame(camera, 2.0)
+    frame.object_id[16, 24] = 1
+    focal_px = 24 / np.tan(np.radians(30))
+    assert images_of(camera, slab, frame=frame) == round(1.0 * focal_px / 2 / 1.5) + 1
+
+    def hidden(x_m: float, y_m: float, z_m: float) -> Drawable:
+        return replace(slab, transform=replace(slab.transform, position_m=(x_m, y_m, z_m)))
+
+    assert images_of(camera, hidden(0.0, 0.0, -1.0)) == round(1.0 * focal_px / 2.9 / 1.5) + 1
+    for lens, seen_m, unseen_m in ((None, -1.4, -1.5), (BARREL, -1.72, -1.8)):
+        bent = replace(camera, distortion=lens)
+        assert images_of(bent, hidden(0.0, seen_m, -1.0)) > 8
+        assert images_of(bent, hidden(0.0, unseen_m, -1.0)) == 4
+    for place in ((5.0, 0.0, -1.0), (0.0, 0.0, 3.0)):
+        assert images_of(camera, hidden(*place)) == 4
