@@ -938,14 +938,17 @@ def test_neither_a_star_nor_a_bright_cloud_is_a_sun(radius: float, irradiance: f
 
 
 def test_walls_shine_as_they_are_lit() -> None:
-    """Albedo times (E / pi + ambient), and their own light, at the middles of 16 x 16 cells of each side; the
-    sun comes through no wall."""
+    """Albedo times (E / pi + ambient), and their own light, at the middles of 16 x 16 cells of each side: no
+    nearer to a bulb than its surface, of a spot all within 0.8 of its half angle, of the sun nothing."""
     size, floor_m, ambient = np.array([3.0, 4.0, 2.5]), -0.75, np.array([0.1, 0.2, 0.3])
     albedo = np.linspace(0.1, 0.8, 18).reshape(6, 3)
     glow = np.linspace(0.5, 0.0, 18).reshape(6, 3)
-    bulb = Light("point", (0.4, -0.7, 0.9), (0.0, 0.0, -1.0), (2.0, 3.0, 4.0), 0.05, 360.0)
+    bulb = Light("point", (1.3, -0.7, 0.9), (0.0, 0.0, -1.0), (2.0, 3.0, 4.0), 0.3, 360.0)
+    spot = Light("spot", (0.1, 0.3, 0.4), (0.6, 0.0, -0.8), (4.0, 2.0, 3.0), 0.05, 80.0)
     lamp = panel((-0.5, 0.6, 1.2), (0.0, -0.6, -0.8), (0.4, 0.3), 5.0)
-    room = light_room(tuple(size), floor_m, albedo, glow, (bulb, lamp, sun((0.0, 0.0, -1.0))), tuple(ambient))
+    room = light_room(
+        tuple(size), floor_m, albedo, glow, (bulb, lamp, spot, sun((0.0, 0.0, -1.0))), tuple(ambient)
+    )
     t = (np.arange(16) + 0.5) / 16 - 0.5
     ahead = np.array(lamp.direction)
     for side in range(6):
@@ -956,14 +959,18 @@ def test_walls_shine_as_they_are_lit() -> None:
         points[..., (axis + 2) % 3] = t[:, None]
         points = points * size + (0, 0, floor_m + size[2] / 2)
         total = np.zeros((16, 16, 3))
-        for light in (bulb, lamp):
+        for light in (bulb, lamp, spot):
             to = np.array(light.position_m) - points
-            distance = np.linalg.norm(to, axis=-1)
+            distance = np.maximum(np.linalg.norm(to, axis=-1), light.radius_m)
             share = np.maximum(-sign * to[..., axis] / distance, 0)
             if light is lamp:
                 share *= 0.12 * np.maximum(-to @ ahead / distance, 0) / (distance**2 + 0.12 / np.pi)
             else:
                 share /= distance**2
+            if light is spot:
+                outer, inner = np.cos(np.radians((40, 32)))
+                edge = np.clip((-to @ light.direction / distance - outer) / (inner - outer), 0, 1)
+                share *= 3 * edge**2 - 2 * edge**3
             total += share[..., None] * light.colour
         np.testing.assert_allclose(room.radiance[side], albedo[side] * (total / np.pi + ambient) + glow[side])
 
@@ -1008,6 +1015,49 @@ def test_a_sky_gives_each_axis_the_light_of_its_half(lamp: float) -> None:
         cosine = np.maximum((1 - 2 * (side % 2)) * towards[..., side // 2], 0)
         wanted = (picture * (cosine * solid)[..., None]).sum((0, 1)) / np.pi
         np.testing.assert_allclose(found[side], wanted, rtol=0.02)
+
+
+def parallel_share(a: float, b: float, h: float) -> float:
+    """Of the light on a surface, what a rectangle 2 a by 2 b gives that faces it in a distance h."""
+    a, b = a / h, b / h
+    p, q = np.sqrt(1 + a * a), np.sqrt(1 + b * b)
+    return float(2 / np.pi * (a / p * np.arctan(b / p) + b / q * np.arctan(a / q)))
+
+
+def test_each_side_of_a_room_gives_ambient_light_by_its_form_factor() -> None:
+    """Low in the middle, at a quarter of the height; towards each axis the six shares are all."""
+    x, y, z = size = (3.0, 4.0, 2.5)
+    none = np.zeros((6, 3))
+    glow = np.eye(6)[:, :, None] * np.ones(3)
+    shares = np.stack([light_room(size, 0.0, none, each, (), ZERO).ambient[:, 1] for each in glow], axis=1)
+    np.testing.assert_allclose(shares.sum(1), 1)
+    assert shares[4, 4] == pytest.approx(parallel_share(x / 2, y / 2, 0.75 * z), rel=2e-3)
+    assert shares[5, 5] == pytest.approx(parallel_share(x / 2, y / 2, 0.25 * z), rel=2e-3)
+    for side, away, aside in ((0, x / 2, y / 2), (2, y / 2, x / 2)):
+        parts = [parallel_share(aside, share * z, away) / 2 for share in (0.25, 0.75)]
+        assert shares[side, side] == pytest.approx(sum(parts), rel=2e-3)
+        assert shares[side + 1, side + 1] == pytest.approx(sum(parts), rel=2e-3)
+    assert shares[0, 1] == shares[4, 5] == 0
+
+
+def test_ambient_light_comes_from_walls_of_their_mean_radiance() -> None:
+    """As these are lit and shine, it has the luminance of `ambient` on average; what they shine is added."""
+    size, ambient = (3.0, 4.0, 2.5), (0.2, 0.2, 0.2)
+    albedo = np.linspace(0.1, 0.8, 6)[:, None] * np.ones(3)
+    glow = np.array([0.0, 0.5, 0.0, 0.0, 0.3, 0.0])[:, None] * np.ones(3)
+    lamp = point_light((0.4, -0.7, 1.5), intensity=6.0)
+    room = light_room(size, 0.0, albedo, glow, (lamp,), ambient)
+    dark = np.zeros((6, 3))
+    shares = np.stack(
+        [
+            light_room(size, 0.0, dark, each, (), ZERO).ambient[:, 1]
+            for each in np.eye(6)[:, :, None] * np.ones(3)
+        ],
+        axis=1,
+    )
+    from_walls = shares @ room.radiance.mean((1, 2))
+    wanted = 0.2 * from_walls / from_walls.mean() + shares @ glow
+    np.testing.assert_allclose(room.ambient, wanted, rtol=1e-5)
 
 
 def test_the_twelve_strongest_lamps_shine_strongest_first() -> None:
