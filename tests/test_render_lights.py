@@ -17,6 +17,7 @@ from fsid.render import Renderer
 from fsid.render.drawable import BACKGROUND_ID, Drawable, background_drawable, panel_drawable, view_of
 from fsid.render.lamps import hoods_apart, lamps_of
 from fsid.render.room import light_room, light_sky
+from fsid.render.shadows import Source
 from fsid.render.sky import _clouds, _lattice, angles, panorama
 from fsid.render.sky_sun import part_sun
 from fsid.scene import SceneConfig, sample
@@ -1086,6 +1087,204 @@ def test_the_twelve_strongest_lamps_shine_strongest_first() -> None:
         np.testing.assert_allclose(light.colour, np.array((0.8, 0.4, 0.2)) * emission * area / 4, rtol=0.02)
         assert light.radius_m == pytest.approx(0.2, rel=0.01)
         np.testing.assert_allclose(source.shape, np.eye(3), atol=0.03)
+
+
+def lamps_in(*drawables: Drawable) -> list[Source]:
+    return lamps_of(hoods_apart(drawables), lambda material: np.array(material.colours[0]), 0.0)
+
+
+GLOWING = replace(plain((0.8, 0.4, 0.2)), emission=5.0)
+ASKEW = Transform((0.3, -0.2, 1.0), (20.0, 50.0, 30.0), ONE)
+
+
+def in_one_part(*meshes: Mesh) -> Mesh:
+    mesh = joined(*meshes)
+    return replace(mesh, face_parts=np.zeros_like(mesh.face_parts), part_names=("part 0",))
+
+
+def test_a_shining_ellipsoid_gives_its_shadow_s_area_in_every_direction() -> None:
+    """I(u) = L pi sqrt((b c u_x)^2 + (c a u_y)^2 + (a b u_z)^2) of half axes a, b, c, along its own axes."""
+    a, b, c = half_axes = np.array((0.25, 0.05, 0.1))
+    own = Drawable(sphere(1.0, 2), replace(ASKEW, rotation_deg=(-35.0, 25.0, 60.0)), (GLOWING,), 1).pose(0.0)[
+        0
+    ]
+    ball = sphere(1.0, 24)
+    mesh = replace(ball, vertices=(ball.vertices * half_axes @ own.T + (0.0, 0.1, 0.0)).astype(np.float32))
+    lamp = Drawable(mesh, replace(ASKEW, scale=(2.0, 2.0, 2.0)), (GLOWING,), 1)
+    (source,) = lamps_in(lamp)
+    rotation, position = lamp.pose(0.0)
+    np.testing.assert_allclose(source.light.position_m, position + 0.2 * rotation[:, 1], atol=1e-4)
+    for u in np.random.default_rng(0).normal(size=(50, 3)):
+        u /= np.linalg.norm(u)
+        expected = 4 * np.pi * np.linalg.norm((b * c, c * a, a * b) * (own.T @ rotation.T @ u))
+        found = np.sqrt(u @ source.shape @ u) * np.array(source.light.colour)
+        np.testing.assert_allclose(found, expected * np.array((4.0, 2.0, 1.0)), rtol=0.03)
+
+
+@pytest.mark.parametrize(
+    ("meshes", "area", "height_m"),
+    [
+        ([sphere(0.1, 48)], 4 * np.pi * 0.01, 0.0),
+        ([sphere(0.1, 48), sphere(0.095, 48)], 4 * np.pi * 0.01, 0.0),  # hollow: what is inside is not seen
+        ([sphere(0.1, 48), moved(sphere(0.1, 12), (0.0, 0.0, 0.6))], 8 * np.pi * 0.01, 0.3),  # two bulbs
+        ([block((0.2, 0.2, 0.1))], 0.16, 0.05),
+        ("a dome", 3 * np.pi * 0.01, 0.05),  # its opening shines
+    ],
+    ids=["ball", "hollow", "two", "block", "dome"],
+)
+def test_a_lamp_is_as_large_as_what_is_seen_of_it(meshes: list[Mesh], area: float, height_m: float) -> None:
+    """Its mean intensity is L A / 4, and its light a sphere of that surface in its middle."""
+    mesh = in_one_part(*(meshes if isinstance(meshes, list) else [sphere(0.1, 48)]))
+    if meshes == "a dome":
+        mesh = replace(mesh, faces=mesh.faces[(mesh.vertices[mesh.faces][..., 2] > -2e-3).all(1)])
+        mesh = replace(mesh, face_parts=np.zeros(len(mesh.faces), np.int32))
+    (source,) = lamps_in(Drawable(mesh, replace(ASKEW, scale=(2.0, 2.0, 2.0)), (GLOWING, GLOWING), 1))
+    rotation, position = Drawable(mesh, ASKEW, (GLOWING,), 1).pose(0.0)
+    light = source.light
+    np.testing.assert_allclose(light.colour, np.array((4.0, 2.0, 1.0)) * 4 * area / 4, rtol=0.04)
+    assert light.radius_m == pytest.approx(np.sqrt(4 * area / (4 * np.pi)), rel=0.02)
+    np.testing.assert_allclose(light.position_m, position + 2 * height_m * rotation[:, 2], atol=0.01)
+    u = np.random.default_rng(0).normal(size=(20_000, 3))
+    u /= np.linalg.norm(u, axis=1, keepdims=True)
+    assert np.sqrt(np.einsum("ni,ij,nj->n", u, source.shape, u)).mean() == pytest.approx(1, abs=3e-3)
+
+
+def disc(radius_m: float) -> Mesh:
+    """A disc in z = 0 that looks up, of 64 corners."""
+    angle = np.arange(64) * np.pi / 32
+    rim = np.stack([radius_m * np.cos(angle), radius_m * np.sin(angle), 0 * angle], -1)
+    vertices = np.concatenate([np.zeros((1, 3)), rim]).astype(np.float32)
+    i = np.arange(64)
+    faces = np.stack([0 * i, 1 + i, 1 + (i + 1) % 64], -1).astype(np.int32)
+    normals = np.tile(np.float32([0, 0, 1]), (65, 1))
+    return Mesh(vertices, normals, faces, np.zeros(64, np.int32), ("disc",))
+
+
+@pytest.mark.parametrize(
+    ("face", "case", "size_m", "centre_m", "ahead"),
+    [
+        (
+            block((0.4, 0.3, 0.004)),
+            moved(block((0.4, 0.3, 0.03)), (0, 0, -0.04)),
+            (0.4, 0.3),
+            (0, 0, 0.004),
+            2,
+        ),
+        (
+            block((0.3, 0.4, 0.004)),
+            moved(block((0.3, 0.4, 0.03)), (0, 0, -0.04)),
+            (0.3, 0.4),
+            (0, 0, 0.004),
+            2,
+        ),
+        (
+            block((0.4, 0.004, 0.3)),
+            moved(block((0.4, 0.03, 0.3)), (0, -0.04, 0)),
+            (0.4, 0.3),
+            (0, 0.002, 0.15),
+            1,
+        ),
+        (
+            block((0.004, 0.4, 0.3)),
+            moved(block((0.03, 0.4, 0.3)), (-0.04, 0, 0)),
+            (0.4, 0.3),
+            (0.002, 0, 0.15),
+            0,
+        ),
+        (
+            in_one_part(moved(grid(0.3, 5), (-0.15, 0, 0)), moved(grid(0.3), (0.15, 0, 0))),
+            *(moved(block((0.6, 0.3, 0.03)), (0, 0, -0.05)), (0.6, 0.3), (0, 0, 0), 2),
+        ),
+        (disc(0.2), moved(block((0.5, 0.5, 0.03)), (0, 0, -0.05)), (0.2 * np.sqrt(np.pi),) * 2, (0, 0, 0), 2),
+    ],
+    ids=["lying", "lying across", "to the north", "to the east", "of many triangles and few", "round"],
+)
+def test_a_display_is_an_area_light_of_its_front(
+    face: Mesh, case: Mesh, size_m: tuple[float, float], centre_m: Vec3, ahead: int
+) -> None:
+    """Of its radiance and area, away from its case, as wide and high as it is along its object's axes."""
+    screen = Drawable(joined(case, face), replace(ASKEW, scale=(2.0, 2.0, 2.0)), (plain(), GLOWING), 1)
+    (source,) = lamps_in(screen)
+    light, (rotation, position) = source.light, screen.pose(0.0)
+    assert light.kind == "area"
+    np.testing.assert_allclose(light.colour, (4.0, 2.0, 1.0))
+    np.testing.assert_allclose(light.size_m, 2 * np.array(size_m), rtol=2e-3)
+    np.testing.assert_allclose(light.position_m, position + rotation @ (2 * np.array(centre_m)), atol=1e-5)
+    np.testing.assert_allclose(light.direction, rotation[:, ahead], atol=1e-5)
+    assert source.axes is not None
+    half_width, half_height = (rotation.T @ axis for axis in source.axes)
+    assert np.abs(half_width).argmax() == (1 if ahead == 0 else 0)
+    assert np.abs(half_height).argmax() == (1 if ahead == 2 else 2)
+    np.testing.assert_allclose(np.linalg.norm((half_width, half_height), axis=1), size_m, rtol=2e-3)
+    np.testing.assert_allclose(
+        -np.cross(half_width, half_height), np.eye(3)[ahead] * np.prod(size_m), atol=1e-3
+    )
+
+
+@pytest.mark.parametrize(
+    ("thick_m", "case_m", "left", "material", "is_display"),
+    [
+        (0.03, 0.08, 1.0, {}, True),
+        (0.06, 0.08, 1.0, {}, False),  # 3/4 of its surface looks up and down
+        (0.03, 0.13, 1.0, {}, False),  # 0.3 times the edge of a square as large are 0.10 m
+        (0.03, 0.08, 0.6, {}, True),
+        (0.03, 0.08, 0.4, {}, False),
+        (0.03, 0.08, 1.0, {"translucency": 0.5}, False),
+        (0.03, 0.08, 1.0, {"transmission": 1.0}, False),
+        (0.03, 0.08, 1.0, {"emission": 0.1}, False),
+    ],
+)
+def test_a_flat_thing_close_before_most_of_an_opaque_back_is_a_display(
+    thick_m: float, case_m: float, left: float, material: dict[str, float], is_display: bool
+) -> None:
+    """case_m: from its front to the back; left: how much of its width that covers."""
+    back = moved(block((0.4 * left, 0.3, 0.01)), (0.2 * left - 0.2, 0.0, thick_m - case_m - 0.01))
+    parts = joined(block((0.4, 0.3, thick_m)), back)
+    pieces = hoods_apart([Drawable(parts, STILL, (GLOWING, replace(plain(), **material)), 1)])
+    assert any(0 in piece.displays for piece in pieces) == is_display
+
+
+def test_what_keeps_off_a_lamp_is_its_hood_and_everything_else_stays_with_it() -> None:
+    """A bulb on a stem that touches it, a display on its case, and a hood and a base apart from both; parts
+    keep their triangles, materials and names, and displays their part."""
+    stem, hood = moved(block((0.02, 0.02, 0.5)), (0, 0, -0.5)), moved(block((0.5, 0.5, 0.01)), (0, 0, 0.15))
+    glass = moved(block((0.5, 0.5, 0.01)), (0, 0, 0.6))
+    case, face = moved(block((0.4, 0.3, 0.03)), (2.0, 0, -0.04)), moved(block((0.4, 0.3, 0.004)), (2.0, 0, 0))
+    base = moved(block((0.3, 0.3, 0.02)), (0, 0, -0.6))
+    mesh = joined(hood, sphere(0.1, 24), stem, glass, face, base, case)
+    bright = replace(plain((0.1, 0.1, 0.1)), emission=9.0)
+    clear = replace(plain((0.3, 0.3, 0.3)), transmission=1.0)
+    materials = (plain(), GLOWING, plain((0.2, 0.2, 0.2)), clear, bright, plain((0.6, 0.6, 0.6)), plain())
+    whole = Drawable(mesh, ASKEW, materials, 1)
+    lamp, apart = hoods_apart([whole])
+    assert lamp.mesh.part_names == ("part 1", "part 2", "part 3", "part 4")
+    assert apart.mesh.part_names == ("part 0", "part 5", "part 6")
+    assert list(lamp.displays) == [3]
+    assert not apart.displays
+    for piece in (lamp, apart):
+        assert (piece.object_id, piece.transform) == (1, ASKEW)
+        for number, name in enumerate(piece.mesh.part_names):
+            part = int(name.removeprefix("part "))
+            assert piece.materials[number] == materials[part]
+            found, wanted = (
+                of.vertices[of.faces[of.face_parts == n]] for of, n in ((piece.mesh, number), (mesh, part))
+            )
+            np.testing.assert_array_equal(found, wanted)
+    kinds = [source.light.kind for source in lamps_in(whole)]
+    assert sorted(kinds) == ["area", "point"]
+    background = replace(whole, object_id=BACKGROUND_ID)
+    assert hoods_apart([background]) == (background,)
+
+
+def test_displays_and_bulbs_are_ranked_by_what_they_give_ahead() -> None:
+    """Radiance times area of a display, and that times a quarter of its surface of a ball."""
+    case, white = moved(block((0.1, 0.1, 0.03)), (0, 0, -0.04)), plain(ONE)
+    screen = Drawable(
+        joined(block((0.1, 0.1, 0.002)), case), STILL, (replace(white, emission=1.0), plain()), 1
+    )
+    for emission, kinds in ((0.9, ["point", "area"]), (0.1, ["area", "point"])):
+        ball = Drawable(sphere(0.1, 24), ASKEW, (replace(white, emission=emission),), 2)  # times 0.0314 m2
+        assert [source.light.kind for source in lamps_in(screen, ball)] == kinds
 
 
 def test_a_sky_turns_from_x_towards_y(tmp_path) -> None:
