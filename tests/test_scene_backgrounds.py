@@ -5,6 +5,10 @@ import pytest
 
 from fsid.assets import BACKGROUND_PARTS, Mesh, build_background, table_size_m
 from fsid.errors import FsidError
+from fsid.scene import SceneConfig
+from fsid.scene.config import BackgroundConfig
+from fsid.scene.model import Background
+from fsid.scene.surroundings import KINDS, background_rand, space_of
 
 SIZE = (4.0, 5.0, 3.0)
 
@@ -75,3 +79,60 @@ def test_the_table_is_as_large_as_stated():
 def test_bad_arguments_name_themselves(kind, size_m, message):
     with pytest.raises(FsidError, match=message):
         build_background(kind, size_m)
+
+
+@pytest.mark.parametrize(
+    ("kind", "size_m", "low", "high", "ground", "floor_m"),
+    [
+        ("room", SIZE, (-1.8, -2.3, 0.1), (1.8, 2.3, 2.8), (2.0, 2.5), 0.0),
+        ("backdrop", SIZE, (-1.8, -2.3, 0.1), (1.8, 1.7, 2.8), (2.0, 2.5), 0.0),  # before the curve
+        ("tabletop", SIZE, (-1.8, -2.3, 0.1), (1.8, 2.3, 2.05), (1.3, 1.3), -0.75),
+        ("open-air", (80.0, 100.0, 9.0), (-32.0, -40.0, 0.1), (32.0, 40.0, 50.0), (40.0, 50.0), 0.0),
+        ("open-air", (300.0, 300.0, 9.0), (-50.0, -50.0, 0.1), (50.0, 50.0, 50.0), (150.0, 150.0), 0.0),
+    ],
+)
+def test_free_space_is_inside_the_walls_and_above_the_ground(kind, size_m, low, high, ground, floor_m):
+    """0.2 m off what the mesh has there; out of doors four fifths of the ground, 50 m at most."""
+    space = space_of(Background(kind, size_m, {}))
+    np.testing.assert_allclose(space.low, low)
+    np.testing.assert_allclose(space.high, high)
+    np.testing.assert_allclose(space.ground, ground)
+    assert space.floor_m == floor_m
+    assert space.open_air_m == (size_m if kind == "open-air" else None)
+    mesh = build_background(kind, size_m)
+    if kind != "open-air":
+        np.testing.assert_allclose(mesh.vertices[:, 2].max() - 0.2, high[2], atol=1e-5)
+        np.testing.assert_allclose(mesh.vertices[:, 2].min(), floor_m, atol=1e-5)
+        np.testing.assert_allclose(mesh.vertices[:, :2].min(0) + 0.2, low[:2], atol=1e-5)
+
+
+def test_a_way_ends_at_the_first_side_of_the_box():
+    space = space_of(Background("room", SIZE, {}))
+    start = np.array((0.5, -0.7, 1.2))
+    directions = np.random.default_rng(0).normal(size=(50, 3))
+    for margin in (0.0, 0.3):
+        for direction in (*directions, (0.0, 0.0, 1.0), (-1.0, 0.0, 0.0)):
+            end = start + np.array(direction) * space.reach(start, np.array(direction), np.inf, margin)
+            gap = np.minimum(end - space.low, space.high - end).min()
+            assert gap == pytest.approx(margin, abs=1e-9)
+            assert space.reach(start, np.array(direction), 1e-3, margin) == 1e-3
+
+
+def test_sizes_of_backgrounds_are_those_that_are_configured(monkeypatch):
+    """Each side of a room is even by itself; the ground is square, its width log-uniform."""
+    monkeypatch.setattr("fsid.scene.surroundings.surface_rand", lambda *given: None)  # takes a while
+    even = (0.0, 0.25, 0.5, 0.75, 1.0)
+    for kind, spans in (("room", ((3, 6), (3, 6), (2.4, 3.2))), ("open-air", ((150, 500), (0, 20)))):
+        shares = tuple(float(name == kind) for name in KINDS)
+        config = SceneConfig(background=BackgroundConfig(kind_shares=shares))
+        drawn = [background_rand(np.random.default_rng(seed), config)[0] for seed in range(150)]
+        sizes = np.array([each.size_m for each in drawn])
+        if kind == "open-air":
+            np.testing.assert_array_equal(sizes[:, 0], sizes[:, 1])
+            places = np.stack([np.log(sizes[:, 0] / 150) / np.log(500 / 150), sizes[:, 2] / 20], -1)
+        else:
+            low, high = np.array(spans).T
+            places = (sizes - low) / (high - low)
+        for place in places.T:
+            np.testing.assert_allclose(np.quantile(place, even), even, atol=0.12)
+        assert np.abs(np.corrcoef(places.T) - np.eye(places.shape[1])).max() < 0.3
