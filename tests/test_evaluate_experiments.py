@@ -10,6 +10,7 @@ import shutil
 import subprocess
 from dataclasses import replace
 from functools import partial
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -90,6 +91,113 @@ def test_figures_of_two_seeds_have_a_spread_and_gaps_of_their_own(tmp_path: Path
     assert f"<td>all materials</td><td>{gap:+.2f}</td>{shown}" in page
     assert "± half the spread between seeds." in page
     assert "paired medians, mean and range of the seeds" in page
+
+
+@pytest.mark.parametrize("kind", ["real-vs-synthetic", "ablation"])
+def test_every_figure_of_an_experiment_is_in_its_place(tmp_path: Path, monkeypatch, kind):
+    """Against sums by hand: of three images of two materials each, four of photographs, and two seeds."""
+    written: dict[str, list] = {}
+    monkeypatch.setattr(
+        "fsid.evaluate.experiment_report.write_report",
+        lambda file, title, lead, sections: written.update(lead=lead, sections=sections),
+    )
+    figures = []
+    monkeypatch.setattr(
+        "fsid.evaluate.experiment_report.plot", lambda figure, caption: figures.append(figure)
+    )
+    rng, seeds = np.random.default_rng(0), (3, 7)
+    config = replace(
+        scale_config("real-vs-synthetic", "smoke"), seeds=seeds, settings=("scene.objects=[1,2]",)
+    )
+    config = replace(config, kind=kind)
+    sources = SOURCES[kind]
+    names = ["noisy", "classical", *(f"{source}-seed{seed}" for source in sources for seed in seeds)]
+    methods = [Method(name, "", NOISY.denoise) for name in names]
+    luxes, isos = [f"{lux:g}lux" for lux in LUXES], ["iso800", "iso3200"]
+    materials = [TestImage(f"{name}{i}", name) for name in ("linen", "leather") for i in range(3)]
+    photographs = [TestImage(f"p{i}", "p") for i in range(4)]
+    values = {
+        (name, level, image.name): rng.lognormal(3, 0.2, 3)
+        for members, levels in ((materials, luxes), (photographs, isos))
+        for name, level, image in product(names, levels, members)
+    }
+    images, rows = [], []
+    for members, levels in ((materials, luxes), (photographs, isos)):
+        some = [
+            ImageRow(name, level, image.set, image.name, *values[name, level, image.name])
+            for name in names
+            for level in levels
+            for image in members
+        ]
+        images += some
+        rows += summarise(TestSet("pixel6", tuple(levels), tuple(members), 0, ""), methods, some)
+    write_experiment_report(tmp_path / "r.html", config, dict.fromkeys(sources, 2), rows, images)
+    assert ", scene.objects=[1,2], " in written["lead"]
+    assert ("(from photographs 2 of up to 1024x1024)" in written["lead"]) == (kind == "real-vs-synthetic")
+    assert written["lead"].count("(from") <= 1
+
+    def mean(source, members, level, metric, seed):
+        name = source if source in names else f"{source}-seed{seed}"
+        return np.mean([values[name, level, image.name][metric] for image in members])
+
+    def gap(rival, members, level, metric):
+        ours, theirs = ([mean(s, members, level, metric, seed) for seed in seeds] for s in ("full", rival))
+        return np.mean(ours) - np.mean(theirs)
+
+    def median(rival, members, level, metric, seed):
+        pairs = [
+            [values[f"{s}-seed{seed}", level, image.name][metric] for image in members]
+            for s in ("full", rival)
+        ]
+        return np.median(np.subtract(*pairs))
+
+    standing, whole, photos, single = written["sections"]
+    assert [each.title for each in (whole, photos)] == ["all materials", "p"]
+    rivals = [source for source in sources if source != "full"]
+    tables = iter(standing.tables)
+    for rival, metric in product(rivals, (0, 1)):
+        table = next(tables)
+        assert table.title.startswith(f"full - {rival}, PSNR {('in RAW', 'after develop')[metric]}")
+        for row, name, members, levels in zip(
+            table.rows, ("all materials", "p"), (materials, photographs), (luxes, isos), strict=True
+        ):
+            each = [gap(rival, members, level, metric) for level in levels]
+            lowest = levels[int(np.argmin(each))].replace("iso", "ISO ").replace("lux", " lux")
+            medians = [
+                np.mean([median(rival, members, level, metric, seed) for level in levels]) for seed in seeds
+            ]
+            shown = f"{medians[0]:+.2f} {medians[1]:+.2f}"
+            assert row == (name, f"{np.mean(each):+.2f}", f"{min(each):+.2f} ({lowest})", shown)
+    for section, members, levels in ((whole, materials, luxes), (photos, photographs, isos)):
+        for metric, table in enumerate(section.tables[:3]):
+            form = ".3f" if metric == 2 else ".2f"
+            for row, source in zip(table.rows, ("noisy", "classical", *sources), strict=True):
+                by = np.array([[mean(source, members, level, metric, s) for s in seeds] for level in levels])
+                trained = source in sources
+                cells = [f"{np.mean(v):{form}}{f' ± {np.ptp(v) / 2:{form}}' if trained else ''}" for v in by]
+                assert row[1:] == (*cells, f"{by.mean():{form}}")
+                assert row[0] in (source, "noisy input") or source == "classical"
+        for metric, table in enumerate(section.tables[3:]):
+            body = list(table.rows)
+            axes = figures[members is photographs].axes[metric]
+            for rival, line in zip(rivals, axes.lines, strict=False):
+                each = [gap(rival, members, level, metric) for level in levels]
+                assert line.get_label() == f"full - {rival}"
+                medians = [[median(rival, members, level, metric, s) for s in seeds] for level in levels]
+                np.testing.assert_allclose(line.get_ydata(), np.mean(medians, axis=1))
+                assert body.pop(0) == (
+                    f"full - {rival}", *(f"{g:+.2f}" for g in each), f"{np.mean(each):+.2f}"
+                )  # fmt: skip
+                cells = [f"{first:+.2f} {second:+.2f}" for first, second in medians]
+                assert body.pop(0) == ("   paired medians", *cells, "")
+            papers = kind == "real-vs-synthetic" and metric == 1 and members is materials
+            assert body == ([("the paper's gap", "-0.40", "-0.74", "+0.01", "-0.14", "-0.32")] * papers)
+    tables = iter(single.tables)
+    for rival, metric in product(rivals, (0, 1)):
+        for row, name in zip(next(tables).rows, ("linen", "leather"), strict=True):
+            members = [image for image in materials if image.set == name]
+            each = [gap(rival, members, level, metric) for level in luxes]
+            assert row == (name, *(f"{g:+.2f}" for g in each), f"{np.mean(each):+.2f}")
 
 
 def test_synthetic_against_real_goes_on_where_it_was_stopped(photos: Path, tmp_path: Path, refused, capsys):
