@@ -16,9 +16,9 @@ def note(line: str) -> None:
 
 
 def note_unread(folders: Iterable[str | Path | None]) -> None:
-    """A line for each folder of photographs that holds pictures of formats that are not read."""
-    from fsid.dataset.photos import unread
+    """A line for each folder that holds pictures of formats that are not read beside such that are."""
+    from fsid.dataset.photos import PHOTO_SUFFIXES, files_inside, unread
 
-    for folder in folders:
-        if folder and Path(folder).is_dir() and (left_out := unread(Path(folder))):
-            note(f"{folder}: {left_out.removeprefix('; ')}")
+    for folder in (Path(folder) for folder in folders if folder):
+        if folder.is_dir() and files_inside(folder, PHOTO_SUFFIXES) and (left_out := unread(folder)):
+            note(f"{folder}: {left_out}")

@@ -38,7 +38,7 @@ def find_photos(folder: str | Path) -> list[Path]:
         raise FsidError(f"{folder}: is not a folder of photographs")
     photos = files_inside(folder, PHOTO_SUFFIXES)
     if not photos:
-        where = deeper(folder, PHOTO_SUFFIXES) or unread(folder)
+        where = instead(folder, PHOTO_SUFFIXES)
         raise FsidError(f"{folder}: holds no photograph ({', '.join(PHOTO_SUFFIXES)}){where}")
     return photos
 
@@ -55,10 +55,17 @@ def unread(folder: Path) -> str:
     if not counts:
         return ""
     formats = ", ".join(f"{count} {suffix}" for suffix, count in sorted(counts.items()))
-    return f"; left out are {formats}, which FSID does not read: save them as .png or .jpg"
+    return f"left out are {formats}, which FSID does not read: save them as .png or .jpg"
 
 
-def deeper(folder: Path, suffixes: tuple[str, ...]) -> str:
+def instead(folder: Path, suffixes: tuple[str, ...]) -> str:
+    """What an error adds where `folder` holds no such files: where some lie, or what else is there; "" for
+    neither."""
+    left_out = unread(folder)
+    return _deeper(folder, suffixes) or (f"; {left_out}" if left_out else "")
+
+
+def _deeper(folder: Path, suffixes: tuple[str, ...]) -> str:
     """In words, where a folder inside `folder` holds such files; "" where none does."""
     for below, subfolders, names in os.walk(folder):
         subfolders[:] = sorted(name for name in subfolders if not name.startswith("."))

@@ -21,10 +21,9 @@ from fsid.dataset.photos import (
     PHOTO_SUFFIXES,
     SMALLEST_PX,
     check_photo,
-    deeper,
     files_inside,
+    instead,
     read_photo,
-    unread,
 )
 from fsid.errors import FsidError, refuse_any
 from fsid.files import check_file
@@ -57,8 +56,7 @@ def find_pictures(folder: str | Path) -> list[Path]:
     suffixes = (*PHOTO_SUFFIXES, EXR_SUFFIX)
     pictures = files_inside(folder, suffixes)
     if not pictures:
-        where = deeper(folder, suffixes) or unread(folder)
-        raise FsidError(f"{folder}: holds no picture ({', '.join(suffixes)}){where}")
+        raise FsidError(f"{folder}: holds no picture ({', '.join(suffixes)}){instead(folder, suffixes)}")
     return pictures
 
 

@@ -34,10 +34,9 @@ def shading_gains(listed: bytes, shape: tuple[int, int]) -> np.ndarray | None:
         if len(data) != _HEAD.size + 4 * rows * columns * depth or not rows * columns * depth:
             continue
         points = np.frombuffer(data, ">f4", offset=_HEAD.size).reshape(rows, columns, depth)[:, :, 0]
-        if max(rows, columns) > _MOST_POINTS:
-            continue
         sound = np.isfinite(points).all() and (points > 0).all() and np.isfinite(places).all()
-        if not (sound and min(row_pitch, column_pitch) > 0 and plane == 0 and planes > 0):
+        sound = sound and max(rows, columns) <= _MOST_POINTS and min(row_pitch, column_pitch) > 0
+        if not (sound and plane == 0 and planes > 0):
             continue
         area = slice(top, bottom, row_pitch), slice(left, right, column_pitch)
         gains = np.ones(shape, np.float32) if gains is None else gains
