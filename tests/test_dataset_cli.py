@@ -319,6 +319,13 @@ def test_progress_shows_rate_time_left_and_failures(capsys: pytest.CaptureFixtur
     assert "worker 1 died" in capsys.readouterr().err
 
 
+def test_a_failure_is_said_where_progress_is_not(capsys: pytest.CaptureFixture[str]) -> None:
+    with progress_bar("pairs", "pairs", quiet=True) as progress:
+        progress(1, 8)
+        progress.failed("worker 1 died")
+    assert capsys.readouterr().err == "worker 1 died\n"
+
+
 @pytest.mark.parametrize("name", ["photos #1", "2024", "photos: a"])
 def test_a_folder_of_pictures_is_taken_as_typed(
     data: Path, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -470,12 +470,20 @@ def test_a_compiler_that_accelerate_is_configured_with_changes_nothing(
     load_denoiser(train(data, tmp_path / "run", replace(CONFIG, steps=1), quiet=True))
 
 
-@pytest.mark.parametrize("name", ["DeepSpeed", "FSDP", "Megatron-LM"])
+@pytest.mark.parametrize(
+    ("variable", "name"),
+    [
+        ("DEEPSPEED", "DeepSpeed"),
+        ("FSDP", "FSDP"),
+        ("MEGATRON_LM", "Megatron-LM"),
+        ("PARALLELISM_CONFIG", "ParallelismConfig"),
+    ],
+)
 def test_a_network_in_parts_is_refused(
-    name: str, data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    variable: str, name: str, data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As `accelerate launch` configures its processes: DeepSpeed ended in a traceback."""
-    monkeypatch.setenv(f"ACCELERATE_USE_{name.upper().replace('-', '_')}", "true")
+    monkeypatch.setenv(f"ACCELERATE_USE_{variable}", "true")
     with pytest.raises(FsidError, match=f"{name}: the configuration of accelerate asks for it"):
         train(data, tmp_path / "run", replace(CONFIG, steps=1), quiet=True)
     assert not (tmp_path / "run").exists()

@@ -49,9 +49,10 @@ class Bar:
             self._bar.console.print(Text(line), soft_wrap=True)
 
     def failed(self, line: str) -> None:
-        """Something failed that will be tried again."""
+        """Something failed that will be tried again; said with --quiet, too."""
         self._failures += 1
-        self._bar.console.print(line, style="yellow", soft_wrap=True, markup=False)
+        console = Terminal(stderr=True) if self._bar.console.quiet else self._bar.console
+        console.print(line, style="yellow", soft_wrap=True, markup=False)
         self._bar.update(self._task, failures=counted(self._failures, "failure"))
 
 

@@ -44,7 +44,12 @@ from fsid.errors import FsidError, check_kind
 from fsid.files import check_folder, held
 from fsid.terminal import Terminal
 
-_SHARDED = {"DEEPSPEED": "DeepSpeed", "FSDP": "FSDP", "MEGATRON_LM": "Megatron-LM"}
+_SHARDED = {
+    "DEEPSPEED": "DeepSpeed",
+    "FSDP": "FSDP",
+    "MEGATRON_LM": "Megatron-LM",
+    "PARALLELISM_CONFIG": "ParallelismConfig",
+}
 """What `accelerate launch` says to its processes, and the name of it."""
 
 
