@@ -118,6 +118,28 @@ def test_a_hostile_gltf_is_refused(tmp_path: Path, case: str):
     refused(folder)
 
 
+@pytest.mark.parametrize("asset", [{}, {"asset": {"version": "1.0"}}, {"asset": {"version": "1.1"}}])
+def test_a_gltf_of_version_1_is_called_so(tmp_path: Path, asset: dict):
+    """Its meshes and all else are dictionaries, and it need not state its version."""
+    node = {"meshes": ["a"]}
+    (tmp_path / "old.gltf").write_text(json.dumps({**asset, "meshes": {"a": {}}, "nodes": {"n": node}}))
+    assert "glTF 1, which is not supported" in refused(tmp_path)
+
+
+def test_a_glb_of_version_1_is_called_so(tmp_path: Path):
+    """It has a length and a format of its text where version 2 has chunks."""
+    text = b'{"meshes": {}}  '
+    (tmp_path / "old.glb").write_bytes(struct.pack("<4sIIII", b"glTF", 1, 36, len(text), 0) + text)
+    assert "glTF 1, which is not supported" in refused(tmp_path)
+
+
+@pytest.mark.parametrize("changes", [{"meshes": []}, {"meshes": [], "accessors": []}, {"scene": 0}])
+def test_a_gltf_of_cameras_alone_has_no_triangles(tmp_path: Path, changes: dict):
+    document = {"asset": {"version": "2.0"}, "nodes": [{"camera": 0}], "scenes": [{"nodes": [0]}]}
+    (tmp_path / "cameras.gltf").write_text(json.dumps(document | changes))
+    assert refused(tmp_path) == "no triangles"
+
+
 def test_the_gltf_of_these_tests_is_good_without_its_change(tmp_path: Path):
     (tmp_path / "good.gltf").write_text(json.dumps(gltf()))
     assert len(mesh_sources(tmp_path)) == 1

@@ -32,6 +32,7 @@ Fetch = Callable[[str], bytes]
 _KEPT = ("asset", "scene", "scenes", "nodes", "meshes", "accessors", "bufferViews")
 _JSON, _BIN = 0x4E4F534A, 0x004E4942
 _PACKED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression")
+_OF_OLD = "glTF 1, which is not supported: save it as glTF 2"
 _LIST, _STRIP, _FAN = 4, 5, 6
 _INTEGERS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4"}
 _URI = re.compile(rb'"uri"\s*:\s*("(?!data:)(?:[^"\\]|\\.){1,1000}")')
@@ -43,6 +44,10 @@ def plain_gltf(data: bytes, fetch: Fetch) -> tuple[bytes, dict[str, bytes]]:
     Raises RefusedError; any other exception means that the document is malformed.
     """
     document, binary = _split(data)
+    if str(document.get("asset", {}).get("version", 1)).startswith("1"):  # which need not say so
+        raise RefusedError(_OF_OLD)
+    if not document.get("meshes"):
+        raise RefusedError("no triangles")
     for name in document.get("extensionsRequired", ()):
         if name in _PACKED:
             raise RefusedError(f"compressed with {name}, which is not supported")
@@ -68,6 +73,8 @@ def _split(data: bytes) -> tuple[dict[str, Any], bytes | None]:
     """The JSON document and the binary chunk of a .glb; of a .gltf there is only the first."""
     if data[:4] != b"glTF":
         return _document(data.removeprefix(b"\xef\xbb\xbf")), None
+    if data[4:8] == struct.pack("<I", 1):
+        raise RefusedError(_OF_OLD)
     chunks: dict[int, bytes] = {}
     at = 12
     while at + 8 <= len(data):
