@@ -255,6 +255,32 @@ def test_a_help_breaks_lines_where_its_terminal_does(capsys: pytest.CaptureFixtu
     assert "network (nafnet-small); may be given several times" in text
 
 
+@pytest.mark.parametrize(
+    "usage",
+    [
+        "calibrate FRAME...",
+        "denoise INPUT OUTPUT",
+        "develop INPUT OUTPUT",
+        "evaluate TESTSET",
+        "export RUN OUTPUT",
+        "generate OUT",
+        "inspect DATA",
+        "preview OUTPUT",
+        "profiles [NAME]",
+        "scene SEED",
+        "testset {photos,simulate,from-bursts} [FOLDER...]",
+        "train DATA",
+    ],
+)
+def test_the_usage_names_what_goes_where(usage: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """As the README does; all places were called PATH."""
+    command, _, places = usage.partition(" ")
+    with pytest.raises(SystemExit):
+        cli.main([command, "--help"])
+    told = " ".join(capsys.readouterr().out.split())
+    assert re.match(rf"usage: fsid {command} \[-h\] (\[[A-Z]+ OPTIONS\] )?{re.escape(places)} ", told)
+
+
 @pytest.mark.parametrize("command", ["generate", "preview"])
 def test_the_paper_s_names_of_variants_are_in_the_help_alone(
     command: str, capsys: pytest.CaptureFixture[str]

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from rich.table import Table
 from rich.text import Text
-from tyro.conf import Positional
+from tyro.conf import Positional, arg
 
 from fsid.cli.arguments import Output, black_levels
 from fsid.cli.notes import note
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def calibrate(
-    frames: Positional[tuple[Path, ...]],
+    frames: Annotated[Positional[tuple[Path, ...]], arg(metavar="FRAME...")],
     *,
     output: Output,
     dark: tuple[Path, ...] = (),

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 from rich.text import Text
-from tyro.conf import Positional
+from tyro.conf import Positional, arg
 
 from fsid.cli.arguments import Ensemble, black_levels
 from fsid.cli.denoise_notes import (
@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 
 
 def denoise(
-    input: Positional[Path],
-    output: Positional[Path],
+    input: Annotated[Positional[Path], arg(metavar="INPUT")],
+    output: Annotated[Positional[Path], arg(metavar="OUTPUT")],
     *,
     model: Path | None = None,
     profile: str | None = None,

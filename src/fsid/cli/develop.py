@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
 
-from tyro.conf import Positional
+from tyro.conf import Positional, arg
 
 
-def develop(input: Positional[Path], output: Positional[Path]) -> None:
+def develop(
+    input: Annotated[Positional[Path], arg(metavar="INPUT")],
+    output: Annotated[Positional[Path], arg(metavar="OUTPUT")],
+) -> None:
     """Develop a RAW file into an upright sRGB PNG: white balance, demosaicing, colour matrix, no tone curve.
 
     Gain maps and BaselineExposure of a DNG are applied, lens distortion is left.

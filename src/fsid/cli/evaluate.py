@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
 
 from rich.table import Column, Table
-from tyro.conf import Positional, UseAppendAction
+from tyro.conf import Positional, UseAppendAction, arg
 
 from fsid.cli.arguments import Ensemble, OptionalOutput
 from fsid.cli.iso_notes import note_files
@@ -16,7 +17,7 @@ from fsid.files import check_folder
 
 
 def evaluate(
-    testset: Positional[Path],
+    testset: Annotated[Positional[Path], arg(metavar="TESTSET")],
     *,
     model: UseAppendAction[tuple[Path, ...]] = (),
     output: OptionalOutput = None,

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
-from tyro.conf import Positional
+from tyro.conf import Positional, arg
 
 from fsid.terminal import Terminal
 
 
 def export(
-    run: Positional[Path],
-    output: Positional[Path],
+    run: Annotated[Positional[Path], arg(metavar="RUN")],
+    output: Annotated[Positional[Path], arg(metavar="OUTPUT")],
     *,
     precision: Literal["float32", "float16", "int8"] | None = None,
     quiet: bool = False,

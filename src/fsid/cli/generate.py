@@ -8,9 +8,9 @@ import shutil
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from tyro.conf import Positional
+from tyro.conf import Positional, arg
 
 from fsid.cli.arguments import overrides
 from fsid.cli.iso_notes import note_extrapolation
@@ -33,7 +33,7 @@ _QUICKLY_READ = 100
 
 
 def generate(
-    out: Positional[Path],
+    out: Annotated[Positional[Path], arg(metavar="OUT")],
     *,
     count: int | None = None,
     seed: int | None = None,

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Annotated
 
 from rich.table import Table
-from tyro.conf import Positional
+from tyro.conf import Positional, arg
 
 from fsid.cli.notes import note_unread
 from fsid.cli.progress import progress_bar
@@ -16,7 +17,7 @@ from fsid.terminal import Terminal
 
 
 def inspect(
-    data: Positional[Path],
+    data: Annotated[Positional[Path], arg(metavar="DATA")],
     *,
     reference: Path | None = None,
     other: Path | None = None,

@@ -62,6 +62,8 @@ COMMANDS: dict[str, Callable[..., None]] = {
 DESCRIPTION = "RAW denoisers trained on nothing but rendered scenes: generate pairs, train, denoise, prove."
 RESUMABLE = {"generate", "train", "experiment", "demo"}
 REPEATABLE = {"--model"}  # of evaluate
+OUTPUTS = {"-o", "--out", "--output"}
+"""What some commands call their last place."""
 ENDING = (signal.SIGTERM, signal.SIGHUP)
 """Of Slurm and `docker stop`, and of a terminal or a connection that is closed."""
 FULL = (errno.ENOSPC, errno.EDQUOT)
@@ -202,11 +204,14 @@ def _check_options(arguments: Sequence[str]) -> None:
     command = COMMANDS.get(arguments[0]) if arguments else None
     parameters = signature(command).parameters.values() if command else ()
     options = {f"--{p.name.replace('_', '-')}" for p in parameters if p.kind is p.KEYWORD_ONLY}
+    places = [p.name.upper() for p in parameters if p.kind is not p.KEYWORD_ONLY]
     known = options | {"-h", "--help"} | ({"-o"} if "--output" in options else set())
     for name in names:
         if command and name not in known:
             near = get_close_matches(name, sorted(known), n=1)
             hint = f"did you mean {near[0]}?" if near else f"see fsid {arguments[0]} --help"
+            if name in OUTPUTS and places[-1:] in (["OUT"], ["OUTPUT"]):
+                hint = f"it is fsid {arguments[0]} {' '.join(places)}"
             raise FsidError(f"{name}: fsid {arguments[0]} has no such option; {hint}")
         if names.count(name) > 1 and name not in REPEATABLE:
             raise FsidError(f"{name}: is given twice; several values go behind one {name}")

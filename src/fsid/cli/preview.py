@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
 
-from tyro.conf import Positional
+from tyro.conf import Positional, arg
 
 from fsid.cli.arguments import overrides
 from fsid.cli.generate import Variant
@@ -13,7 +14,7 @@ from fsid.cli.progress import progress_bar
 
 
 def preview(
-    output: Positional[Path],
+    output: Annotated[Positional[Path], arg(metavar="OUTPUT")],
     *,
     count: int = 12,
     seed: int = 0,

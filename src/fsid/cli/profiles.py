@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
 
 from rich.table import Column, Table
 from rich.text import Text
-from tyro.conf import Positional
+from tyro.conf import Positional, arg
 
 from fsid.cli.tables import print_table
 from fsid.errors import FsidError
 from fsid.terminal import Terminal
 
 
-def profiles(name: Positional[str | None] = None, *, plot: Path | None = None) -> None:
+def profiles(
+    name: Annotated[Positional[str | None], arg(metavar="[NAME]")] = None, *, plot: Path | None = None
+) -> None:
     """List the built-in camera noise profiles, or show one: k and sigma2 per ISO and CFA site.
 
     Args:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
 
-from tyro.conf import Positional
+from tyro.conf import Positional, arg
 
 from fsid.cli.arguments import Output, overrides
 from fsid.cli.generate import Variant
@@ -13,7 +14,7 @@ from fsid.files import write_atomically
 
 
 def scene(
-    seed: Positional[int],
+    seed: Annotated[Positional[int], arg(metavar="SEED")],
     *,
     output: Output,
     config: Path | None = None,

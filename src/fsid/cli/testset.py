@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from rich.table import Column, Table
-from tyro.conf import Positional
+from tyro.conf import Positional, arg
 
 from fsid.cli.arguments import Output
 from fsid.cli.iso_notes import note_files
@@ -24,7 +24,7 @@ DEFAULT_ISOS = (800, 1600, 3200, 6400)
 
 def testset(
     source: Positional[Literal["photos", "simulate", "from-bursts"]],
-    folders: Positional[tuple[Path, ...]] = (),
+    folders: Annotated[Positional[tuple[Path, ...]], arg(metavar="[FOLDER...]")] = (),
     *,
     output: Output,
     camera: str = "",

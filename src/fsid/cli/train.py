@@ -6,8 +6,9 @@ import os
 import shlex
 import sys
 from pathlib import Path
+from typing import Annotated
 
-from tyro.conf import Positional
+from tyro.conf import Positional, arg
 
 from fsid.cli.arguments import Output
 from fsid.cli.iso_notes import note_extrapolation
@@ -17,7 +18,7 @@ from fsid.terminal import Terminal
 
 
 def train(
-    data: Positional[Path],
+    data: Annotated[Positional[Path], arg(metavar="DATA")],
     *,
     output: Output,
     config: Path = Path("nafnet-tiny"),
