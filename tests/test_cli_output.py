@@ -252,7 +252,7 @@ def test_a_help_breaks_lines_where_its_terminal_does(capsys: pytest.CaptureFixtu
         cli.main(["evaluate", "--help"])
     text = capsys.readouterr().out
     assert "images.csv (every image) and report.html (tables, plot, before and after, error maps)." in text
-    assert "network (nafnet-small); may be given several times" in text
+    assert "shipped network (nafnet-small); may be given several" in text
 
 
 @pytest.mark.parametrize(
@@ -279,6 +279,22 @@ def test_the_usage_names_what_goes_where(usage: str, capsys: pytest.CaptureFixtu
         cli.main([command, "--help"])
     told = " ".join(capsys.readouterr().out.split())
     assert re.match(rf"usage: fsid {command} \[-h\] (\[[A-Z]+ OPTIONS\] )?{re.escape(places)} ", told)
+
+
+@pytest.mark.parametrize("command", cli.COMMANDS)
+def test_the_help_of_an_option_is_free_of_python(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """--iso FLOAT, where it was --iso {None}|FLOAT (default: None); switches and empty lists likewise."""
+    with pytest.raises(SystemExit):
+        cli.main([command, "--help"])
+    assert not re.search(r"None|False|default: *\)|default: *''", capsys.readouterr().out)
+
+
+def test_defaults_that_are_figures_are_told(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        cli.main(["preview", "--help"])
+    text = capsys.readouterr().out
+    assert "Number of scenes. (default: 12)" in text
+    assert "Seed of the dataset. (default: 0)" in text
 
 
 @pytest.mark.parametrize("command", ["generate", "preview"])

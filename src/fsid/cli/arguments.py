@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 Output = Annotated[Path, tyro.conf.arg(name="output", aliases=["-o"])]
 OptionalOutput = Annotated[Path | None, tyro.conf.arg(name="output", aliases=["-o"])]
+Settings = Annotated[tuple[str, ...], tyro.conf.arg(metavar="KEY=VALUE ...")]
 Ensemble = Literal[1, 2, 4, 8]
 
 

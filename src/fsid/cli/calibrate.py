@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def calibrate(
-    frames: Annotated[Positional[tuple[Path, ...]], arg(metavar="FRAME...")],
+    frames: Annotated[Positional[tuple[Path, ...]], arg(metavar="FRAME...", help_behavior_hint="(required)")],
     *,
     output: Output,
     dark: tuple[Path, ...] = (),

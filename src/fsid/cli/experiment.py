@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 from tyro.conf import Positional
 
-from fsid.cli.arguments import Output
+from fsid.cli.arguments import Output, Settings
 from fsid.cli.notes import note, note_unread
 from fsid.cli.progress import progress_bar
 from fsid.terminal import Terminal
@@ -30,7 +30,7 @@ def experiment(
     width: int | None = None,
     height: int | None = None,
     camera: str = "pixel6",
-    set: tuple[str, ...] = (),
+    set: Settings = (),
     workers: int = 1,
     quiet: bool = False,
 ) -> None:

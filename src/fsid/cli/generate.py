@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import Positional, arg
 
-from fsid.cli.arguments import overrides
+from fsid.cli.arguments import Settings, overrides
 from fsid.cli.iso_notes import note_extrapolation
 from fsid.cli.libraries import read_libraries
 from fsid.cli.notes import note, note_unread
@@ -38,7 +38,7 @@ def generate(
     count: int | None = None,
     seed: int | None = None,
     config: Path | None = None,
-    set: tuple[str, ...] = (),
+    set: Settings = (),
     width: int | None = None,
     height: int | None = None,
     variant: Variant | None = None,

@@ -38,6 +38,7 @@ from fsid.cli import (
     testset,
     train,
 )
+from fsid.cli.optional import AS_GIVEN, without_empty_defaults
 from fsid.errors import FsidError
 from fsid.terminal import Terminal, error_line
 
@@ -144,12 +145,14 @@ def _run(arguments: Sequence[str] | None) -> None:
         _check_options(sys.argv[1:] if arguments is None else arguments)
         for command in COMMANDS.values():
             command.__doc__ = _flowing(command.__doc__ or "")
+            without_empty_defaults(command)
         tyro.extras.subcommand_cli_from_dict(
             COMMANDS,
             prog="fsid",
             description=DESCRIPTION,
             args=arguments,
             config=(tyro.conf.FlagCreatePairsOff,),
+            registry=AS_GIVEN,
         )
     except FsidError as error:
         _fail(str(error))

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from tyro.conf import Positional, arg
 
-from fsid.cli.arguments import overrides
+from fsid.cli.arguments import Settings, overrides
 from fsid.cli.generate import Variant
 from fsid.cli.libraries import read_libraries
 from fsid.cli.progress import progress_bar
@@ -19,7 +19,7 @@ def preview(
     count: int = 12,
     seed: int = 0,
     config: Path | None = None,
-    set: tuple[str, ...] = (),
+    set: Settings = (),
     width: int | None = None,
     height: int | None = None,
     variant: Variant | None = None,

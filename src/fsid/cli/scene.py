@@ -7,7 +7,7 @@ from typing import Annotated
 
 from tyro.conf import Positional, arg
 
-from fsid.cli.arguments import Output, overrides
+from fsid.cli.arguments import Output, Settings, overrides
 from fsid.cli.generate import Variant
 from fsid.errors import FsidError
 from fsid.files import write_atomically
@@ -18,7 +18,7 @@ def scene(
     *,
     output: Output,
     config: Path | None = None,
-    set: tuple[str, ...] = (),
+    set: Settings = (),
     width: int | None = None,
     height: int | None = None,
     variant: Variant | None = None,

@@ -10,7 +10,7 @@ from typing import Annotated
 
 from tyro.conf import Positional, arg
 
-from fsid.cli.arguments import Output
+from fsid.cli.arguments import Output, Settings
 from fsid.cli.iso_notes import note_extrapolation
 from fsid.cli.notes import note, note_unread
 from fsid.errors import FsidError
@@ -22,7 +22,7 @@ def train(
     *,
     output: Output,
     config: Path = Path("nafnet-tiny"),
-    set: tuple[str, ...] = (),
+    set: Settings = (),
     resume: bool = False,
     quiet: bool = False,
 ) -> None:
