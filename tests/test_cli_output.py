@@ -289,6 +289,16 @@ def test_the_help_of_an_option_is_free_of_python(command: str, capsys: pytest.Ca
     assert not re.search(r"None|False|default: *\)|default: *''", capsys.readouterr().out)
 
 
+def test_the_list_of_commands_has_a_sentence_of_each(capsys: pytest.CaptureFixture[str]) -> None:
+    """And their help all the rest, whichever is asked for first."""
+    for arguments, more in (["--help"], False), (["demo", "--help"], True), (["--help"], False):
+        with pytest.raises(SystemExit):
+            cli.main(arguments)
+        told = " ".join(capsys.readouterr().out.split())
+        assert "Render scenes, train a small network" in told
+        assert ("Running it again continues it." in told) is more
+
+
 def test_defaults_that_are_figures_are_told(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         cli.main(["preview", "--help"])

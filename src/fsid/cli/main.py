@@ -10,8 +10,8 @@ import re
 import select
 import signal
 import sys
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from difflib import get_close_matches
 from inspect import cleandoc, signature
 from types import FrameType
@@ -60,7 +60,10 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "doctor": doctor.doctor,
 }
 
-DESCRIPTION = "RAW denoisers trained on nothing but rendered scenes: generate pairs, train, denoise, prove."
+DESCRIPTION = (
+    "RAW denoisers trained on nothing but rendered scenes: generate pairs, train, denoise, prove. "
+    "fsid COMMAND --help describes a command and its options."
+)
 RESUMABLE = {"generate", "train", "experiment", "demo"}
 REPEATABLE = {"--model"}  # of evaluate
 OUTPUTS = {"-o", "--out", "--output"}
@@ -143,17 +146,15 @@ def _run(arguments: Sequence[str] | None) -> None:
         return
     try:
         _check_options(sys.argv[1:] if arguments is None else arguments)
-        for command in COMMANDS.values():
-            command.__doc__ = _flowing(command.__doc__ or "")
-            without_empty_defaults(command)
-        tyro.extras.subcommand_cli_from_dict(
-            COMMANDS,
-            prog="fsid",
-            description=DESCRIPTION,
-            args=arguments,
-            config=(tyro.conf.FlagCreatePairsOff,),
-            registry=AS_GIVEN,
-        )
+        with _documented((sys.argv[1:] if arguments is None else list(arguments))[:1]):
+            tyro.extras.subcommand_cli_from_dict(
+                COMMANDS,
+                prog="fsid",
+                description=DESCRIPTION,
+                args=arguments,
+                config=(tyro.conf.FlagCreatePairsOff,),
+                registry=AS_GIVEN,
+            )
     except FsidError as error:
         _fail(str(error))
     except ModuleNotFoundError as error:
@@ -177,6 +178,21 @@ def _run(arguments: Sequence[str] | None) -> None:
         hint = "; the same command goes on from what is finished" if goes_on else ""
         _tell(Text(f"fsid: {what}{hint}"))
         sys.exit(code)
+
+
+@contextmanager
+def _documented(given: Sequence[str]) -> Iterator[None]:
+    """Inside, commands say what the help shows: all of the given one, the first line of the others."""
+    before = {name: command.__doc__ or "" for name, command in COMMANDS.items()}
+    try:
+        for name, command in COMMANDS.items():
+            document = _flowing(before[name])
+            command.__doc__ = document if name in given else document.partition("\n")[0]
+            without_empty_defaults(command)
+        yield
+    finally:
+        for name, command in COMMANDS.items():
+            command.__doc__ = before[name]
 
 
 def _flowing(docstring: str) -> str:
