@@ -324,6 +324,13 @@ def _fails(match, *arguments, **options):
 LAYOUT = Layout(iso=800, cfa=PROFILE.cfa, black_level=64, white_level=1023)
 
 
+def test_a_frame_or_two_are_too_few(tmp_path, rng):
+    light = write_burst(tmp_path / "light", rng, scene(), 400, 1)
+    _fails("only 1 frame and 0 dark frames of ISO 400; a calibration needs at least 3 in all", light)
+    dark = write_burst(tmp_path / "dark", rng, scene(0.0), 400, 1)
+    _fails("only 1 frame and 1 dark frame of ISO 400", light, dark=dark)
+
+
 def test_the_lowest_of_bare_dark_frames_is_the_black_level(tmp_path, rng):
     """Bare mosaics state no exposure, and the long dark frames may come first by name."""
     lit = write_arrays(tmp_path / "lit", [to_dn(raw) for raw in exposures(rng, scene(), 800, 10)])

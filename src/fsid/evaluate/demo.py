@@ -39,6 +39,7 @@ from fsid.evaluate.results import write_results
 from fsid.evaluate.resumable_folder import claimed
 from fsid.evaluate.testset import TESTSET_FILE, photo_testset
 from fsid.files import make_folder, write_atomically
+from fsid.plurals import counted
 from fsid.sensor import develop, load_profile, read_raw
 
 PHOTOGRAPHS = (
@@ -155,7 +156,7 @@ def _lead(config: DemoConfig, comparison: Comparison) -> str:
     over = psnr["ours", CROP_LEVEL] - psnr["classical", CROP_LEVEL]
     return (
         f"A small network, trained on {config.scenes} rendered scenes and nothing else, measured on "
-        f"{config.photographs} photographs with Pixel 6 noise. "
+        f"{counted(config.photographs, 'photograph')} with Pixel 6 noise. "
         f"At ISO 3200: {gain:+.2f} dB over the noisy input, "
         f"{over:+.2f} dB over the classical denoiser (RAW PSNR). "
         "ISO 6400 is beyond the published noise fit (ISO 49 to 3199) and extrapolated."

@@ -150,7 +150,8 @@ def _fit_iso(reader: _Reader, iso: float, tie_greens: bool) -> NoiseFit:
     darks = [frame for frame in reader.found.dark if frame.iso == iso]
     if len(lights) + len(darks) < MIN_FRAMES:
         raise FsidError(
-            f"{lights[0].path}: only {len(lights)} frames and {len(darks)} dark frames of ISO {iso:g}; a "
+            f"{lights[0].path}: only {counted(len(lights), 'frame')} and "
+            f"{counted(len(darks), 'dark frame')} of ISO {iso:g}; a "
             f"calibration needs at least {MIN_FRAMES} in all, and 20 or more to be good"
         )
     black, pooled = _pool_dark(reader, iso, darks)
