@@ -517,6 +517,28 @@ def test_photographs_too_small_to_train_on_are_named_before_anything_is_written(
     told = refused(*command, "--photos", tmp_path / "train", "--test", tmp_path / "test")
     assert "1 of 8 pictures cannot be used" in told
     assert "icon-train.png: is 120x49 pixels, at least 50x50 are needed" in told
+    told = refused(*command, "--photos", photos, "--test", tmp_path / "tiny")
+    assert "icon-tiny.png: is 31x48 pixels, at least 32x32 are needed" in told
+    assert not (tmp_path / "out").exists()
+
+
+def test_frames_too_small_for_a_training_that_makes_them_smaller_are_refused_before_they_are_made(
+    photos: Path, tmp_path: Path, refused
+):
+    """Patches of 24 packed pixels of images 4 times smaller: all scenes were made, and then none would do.
+    Of photographs those that are too small are left out."""
+    for name, size in (("train", (40, 40)), ("test", (31, 31))):
+        shutil.copytree(photos, tmp_path / name)
+        Image.open(min(photos.iterdir())).resize(size).save(tmp_path / name / f"icon-{name}.png")
+    network = tmp_path / "network.yaml"
+    network.write_text("shrink: [2, 4]")
+    command = ["experiment", "real-vs-synthetic", "-o", str(tmp_path / "out"), *SMOKE, "--network", network]
+    command += ["--photos", tmp_path / "train", "--test", tmp_path / "test"]
+    told = refused(*command, "--width", "300", "--height", "198")
+    assert "--width 300 --height 198: patches of the training need 200x200" in told
+    told = refused(*command, "--width", "200", "--height", "200")
+    assert "1 of 8 pictures cannot be used" in told
+    assert "icon-test.png" in told
     assert not (tmp_path / "out").exists()
 
 

@@ -123,11 +123,13 @@ def _check(out: Path, config: ExperimentConfig, bar: ProgressBar, workers: int) 
         _generator(out, config, source)
         _count(config, source)
     check_given(_generator(out, config, SCENES), given_keys(config.settings))
-    least = 2 * training.patch_px + 2 if 1 in training.shrink else 0
-    if min(config.width, config.height) < least:
+    patch = 2 * training.patch_px + 2
+    needed = patch * max(training.shrink)  # frames are of one size, and patches are cut at every shrink
+    if min(config.width, config.height) < needed:
         raise FsidError(
-            f"--width {config.width} --height {config.height}: patches of the training need {least}x{least}"
+            f"--width {config.width} --height {config.height}: patches of the training need {needed}x{needed}"
         )
+    least = patch if 1 in training.shrink else 0
     tests = [path for folder in config.tests for path in find_photos(Path(folder))]
     photos = find_pictures(Path(config.photos)) if PHOTOGRAPHS in SOURCES[config.kind] else []
     if (out / "experiment.yaml").exists():
