@@ -478,6 +478,7 @@ def test_a_test_set_of_another_noise_than_the_camera_has_now_is_not_measured_on(
         (["ablation", "--set", "cameras=[galaxy-s22]"], "--set cameras: is no setting of the scenes"),
         (["ablation", "--set", "scene.hdri_share=1"], "scene.hdri_share: has no effect while"),
         (["ablation", "--width", "101"], "width: 101"),
+        (["ablation", "--workers", "0"], "--workers must be at least 1"),
         (["ablation", "--height", "128"], "--width 480 --height 128: patches of the training need 130x130"),
         (["real-vs-synthetic", "--photos", "."], "holds no picture"),
         (["ablation", "--test", "."], "holds no photograph"),

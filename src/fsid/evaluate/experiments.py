@@ -20,6 +20,7 @@ from pathlib import Path
 from fsid.config import Override, given_keys, load_settings
 from fsid.dataset import (
     GenerateConfig,
+    Workforce,
     check_given,
     find_photos,
     find_pictures,
@@ -118,6 +119,7 @@ def _check(out: Path, config: ExperimentConfig, bar: ProgressBar, workers: int) 
     Once it has begun, the folder belongs to it, and a corrected command would be another experiment. So every
     photograph is decoded before, to see that it can be.
     """
+    Workforce(workers)  # FsidError for less than one
     training = _training(config, config.seeds[0])
     for source in SOURCES[config.kind]:
         _generator(out, config, source)
@@ -147,7 +149,7 @@ def _overlap(config: ExperimentConfig, workers: int) -> str:
     if PHOTOGRAPHS not in SOURCES[config.kind]:
         return ""
     tests = {set_name(folder): find_photos(folder) for folder in config.tests}
-    threads = max(min(workers, os.cpu_count() or 1), 1)
+    threads = min(workers, os.cpu_count() or 1)
     return overlap_note(tests, find_pictures(Path(config.photos)), threads)
 
 
