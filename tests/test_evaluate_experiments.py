@@ -420,6 +420,49 @@ def test_figures_that_lack_an_image_are_not_taken_for_all(tmp_path: Path, monkey
             _measured(tmp_path / "m", [method], [tmp_path], partial(progress_bar, quiet=True))
 
 
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"count": 0}, "--count and --seeds must name at least one"),
+        ({"materials_scenes": 0}, "must name at least one"),
+        ({"seeds": ()}, "must name at least one"),
+        ({"steps": -1}, "--steps must not be negative"),
+        ({"seeds": (-1, 2)}, "--seeds -1 2: must be at least 0 and below 2"),
+        ({"seeds": (2**64,)}, "--seeds 18446744073709551616: must be at least 0 and below 2"),
+        ({"seeds": (3, 4, 3)}, "--seeds 3 4 3: give different ones"),
+        ({"count": 2.5}, "count: 2.5"),
+        ({"kind": "real-vs-synthetic"}, "--photos: name the folder"),
+    ],
+)
+def test_an_experiment_that_cannot_be_is_refused(changes: dict, words: str):
+    with pytest.raises(FsidError, match=words):
+        replace(scale_config("ablation", "smoke"), **changes)
+
+
+def test_the_least_and_the_most_that_an_experiment_may_be():
+    """The smallest one; seeds of all 64 bits; settings of scenes and of which of them are left out."""
+    least = {"count": 1, "materials_scenes": 1, "steps": 0, "seeds": (0, 2**64 - 1)}
+    settings = ("scene.objects=[1,2]", "checks.duplicate_bits=-1", "quality=fast")
+    config = replace(scale_config("ablation", "smoke"), **least, settings=settings)
+    assert (config.settings, config.seeds) == (settings, least["seeds"])
+
+
+def test_scales_are_those_of_the_guide():
+    """docs/experiments.md: pairs, size of frames, network and steps; 0 are those of the network."""
+    for kind in SOURCES:
+        found = {
+            name: (config.count, config.width, config.height, config.network, config.steps, config.seeds)
+            for name, config in ((name, scale_config(kind, name)) for name in ("smoke", "cpu", "paper"))
+        }
+        assert found == {
+            "smoke": (4, 128, 96, "nafnet-tiny", 30, (0, 1)),
+            "cpu": (800, 480, 270, "nafnet-tiny", 6000, (0, 1)),
+            "paper": (175_000, 1920, 1080, "paper", 0, (0, 1)),
+        }
+    with pytest.raises(FsidError, match="--scale large: choose smoke, cpu or paper"):
+        scale_config("ablation", "large")
+
+
 def test_sources_of_all_sizes_are_trained_on_alike(tmp_path: Path):
     config = scale_config("ablation", "paper")
     assert _training(config, 3).shrink == (1,)
@@ -480,16 +523,19 @@ def test_a_test_set_of_another_noise_than_the_camera_has_now_is_not_measured_on(
         (["ablation", "--width", "101"], "width: 101"),
         (["ablation", "--workers", "0"], "--workers must be at least 1"),
         (["ablation", "--height", "128"], "--width 480 --height 128: patches of the training need 130x130"),
+        (["ablation", "--width", "128"], "--width 128 --height 270: patches of the training need 130x130"),
         (["real-vs-synthetic", "--photos", "."], "holds no picture"),
         (["ablation", "--test", "."], "holds no photograph"),
+        (["ablation", "--set", "noise_levels=2"], "--set noise_levels: is no setting of the scenes"),
         (["ablation", "--test", "a/val", "b/val"], "another test set is called val"),
+        (["ablation", "--test", "all"], "another test set is called all"),
         (["ablation", "--test", "materials"], "another test set is called materials"),
         (["ablation", "--test", "fabric"], "another test set is called fabric"),
     ],
 )
 def test_bad_input_is_one_line(tmp_path: Path, arguments: list[str], words: str, monkeypatch, refused):
     monkeypatch.chdir(tmp_path)
-    for folder in ("a/val", "b/val", "materials", "fabric"):
+    for folder in ("a/val", "b/val", "all", "materials", "fabric"):
         (tmp_path / folder).mkdir(parents=True)
     assert words in refused("experiment", *arguments, "-o", tmp_path / "out", "--quiet")
     assert not (tmp_path / "out").exists()
@@ -500,8 +546,10 @@ def test_unreadable_photographs_are_named_before_anything_is_written(photos: Pat
         shutil.copytree(photos, tmp_path / name)
         (tmp_path / name / f"broken-{name}.jpg").write_bytes(b"no picture")
     command = ["experiment", "real-vs-synthetic", "-o", str(tmp_path / "out"), *SMOKE]
-    told = refused(*command, "--photos", tmp_path / "train", "--test", tmp_path / "test")
-    assert "2 of 8 pictures cannot be used" in told
+    shutil.copytree(photos, tmp_path / "good")
+    folders = ["--photos", tmp_path / "train", "--test", tmp_path / "good", tmp_path / "test"]
+    told = refused(*command, *folders)
+    assert "2 of 11 pictures cannot be used" in told
     assert "broken-train.jpg: cannot be read" in told
     assert "broken-test.jpg: cannot be read" in told
     assert not (tmp_path / "out").exists()
@@ -510,8 +558,9 @@ def test_unreadable_photographs_are_named_before_anything_is_written(photos: Pat
 def test_photographs_too_small_to_train_on_are_named_before_anything_is_written(
     photos: Path, tmp_path: Path, refused
 ):
-    """Smoke trains on patches of 24 packed pixels; a test photograph of that size can be measured on."""
-    for name, size in (("train", (120, 49)), ("test", (32, 32))):
+    """Smoke trains on patches of 24 packed pixels; a test photograph of that size can be measured on, down to
+    32 pixels."""
+    for name, size in (("train", (120, 49)), ("test", (32, 32)), ("tiny", (31, 48))):
         shutil.copytree(photos, tmp_path / name)
         Image.open(min(photos.iterdir())).resize(size).save(tmp_path / name / f"icon-{name}.png")
     command = ["experiment", "real-vs-synthetic", "-o", str(tmp_path / "out"), *SMOKE]
