@@ -8,6 +8,7 @@ import json
 import re
 import shutil
 import subprocess
+from collections import defaultdict
 from dataclasses import replace
 from functools import partial
 from itertools import product
@@ -22,7 +23,7 @@ from fsid.cli.main import main
 from fsid.cli.progress import progress_bar
 from fsid.config import save_settings
 from fsid.errors import FsidError
-from fsid.evaluate.compare import NOISY, Method, summarise
+from fsid.evaluate.compare import CLASSICAL, NOISY, Method, summarise
 from fsid.evaluate.dead_leaves import RADIUS_PX, dead_leaves_rand, write_dead_leaves
 from fsid.evaluate.demo import ISOS, DemoConfig, _copy_photographs
 from fsid.evaluate.experiment_config import DEAD_LEAVES, PHOTOGRAPHS, SCENES, SOURCES, scale_config
@@ -323,6 +324,21 @@ def test_networks_are_trained_on_the_noise_that_they_are_tested_on():
     assert _training(chosen, 0).iso_max == 3200
 
 
+@pytest.mark.parametrize("camera", ["pixel6", "galaxy-s22"])
+def test_the_noise_of_a_training_spans_what_is_tested_and_what_its_configuration_says(
+    tmp_path: Path, camera: str
+):
+    """Tested are ISO 800 to 6400, and 0.5 to 5 lux, at which these two take up to ISO 15358 and 13629."""
+    tested = {"pixel6": (800, 15358), "galaxy-s22": (800, 13629)}[camera]
+    network = tmp_path / "network.yaml"
+    config = replace(scale_config("ablation", "cpu"), camera=camera, network=str(network))
+    for stated, expected in (((3000, 4000), tested), ((100, 50_000), (100, 50_000))):
+        network.write_text("iso_min: {}\niso_max: {}".format(*stated))
+        found = _training(config, 0)
+        assert (found.iso_min, found.iso_max) == pytest.approx(expected, abs=1)
+        assert found.profiles == (camera,)
+
+
 def test_a_training_is_that_of_its_seed_and_of_the_settings_that_were_given():
     """Steps that are given are those of all trainings."""
     config = replace(scale_config("ablation", "cpu"), steps=7, train_settings=("steps=9", "batch=3"))
@@ -333,16 +349,16 @@ def test_a_training_is_that_of_its_seed_and_of_the_settings_that_were_given():
     assert usual.seed == 12
 
 
-def test_rivals_are_made_of_their_own_settings_and_of_one_camera(photos: Path, tmp_path: Path):
-    """Settings of scenes are those of every variant; frames of photographs are 1024 pixels at least."""
+def test_rivals_are_made_of_their_own_settings_and_of_one_camera(photos: Path, tmp_path: Path, monkeypatch):
+    """Settings of scenes are those of every variant; frames of photographs are 1024 pixels at least, and the
+    same command may go on from another folder."""
+    monkeypatch.chdir(tmp_path)
     config = replace(
         scale_config("real-vs-synthetic", "smoke"),
         **{"photos": str(photos), "camera": "galaxy-s22", "settings": ("scene.objects=[3,4]",)},
         **{"width": 1200, "height": 640},
     )
-    found = {
-        name: _generator(tmp_path, config, name) for name in (*SOURCES["ablation"], *SOURCES[config.kind])
-    }
+    found = {name: _generator(Path(), config, name) for name in (*SOURCES["ablation"], *SOURCES[config.kind])}
     assert set(found) == {"objects", "materials", "objects-materials", "full", "photographs", "dead-leaves"}
     for name, made in found.items():
         assert made.cameras == ("galaxy-s22",)
@@ -353,30 +369,36 @@ def test_rivals_are_made_of_their_own_settings_and_of_one_camera(photos: Path, t
     assert found[DEAD_LEAVES].images == str(tmp_path / "dead-leaves")
 
 
+@pytest.mark.parametrize("count", [2, 4])
 def test_every_source_is_trained_on_with_every_seed_and_made_with_the_first(
-    photos: Path, tmp_path: Path, monkeypatch
+    photos: Path, tmp_path: Path, monkeypatch, count: int
 ):
-    """Of photographs as many pairs as there are, if that is more; nothing here is rendered or trained."""
+    """Of photographs as many pairs as there are, if that is more; every network is measured as itself.
+    Nothing here is rendered or trained."""
     module, calls = "fsid.evaluate.experiments", []
-    config = replace(scale_config("real-vs-synthetic", "smoke"), photos=str(photos), count=2, seeds=(5, 8))
+    config = replace(
+        scale_config("real-vs-synthetic", "smoke"), photos=str(photos), count=count, seeds=(5, 8)
+    )
 
     def recorded(name):
         return lambda *given, **options: calls.append((name, given, options))
 
     def measured(stem, methods, testsets, bar):
-        rows = [(stem.parent.name, stem.name, method.name, method.training) for method in methods]
+        rows = [(stem.parent.name, stem.name, m.name, m.training, m.denoise) for m in methods]
         return rows, [stem.name]
 
+    networks = defaultdict(lambda: lambda raw: raw)
     for name in ("generate", "train", "write_dead_leaves", "write_results", "write_images"):
         monkeypatch.setattr(f"{module}.{name}", recorded(name))
     monkeypatch.setattr(f"{module}._testsets", lambda out, config, bar: [])
     monkeypatch.setattr(f"{module}._measured", measured)
-    monkeypatch.setattr(f"{module}.model_method", lambda run, name: Method(name, "", NOISY.denoise))
-    monkeypatch.setattr(f"{module}.write_experiment_report", lambda path, config, pairs, *rest: (path, pairs))
-    out = tmp_path / "out"
-    report, pairs = experiment(out, config, workers=3)
+    monkeypatch.setattr(f"{module}.model_method", lambda run, name: Method(name, "", networks[run]))
+    monkeypatch.setattr(f"{module}.write_experiment_report", lambda path, config, *rest: (path, *rest))
+    out, notes = tmp_path / "out", []
+    report, pairs, *shown, overlap = experiment(out, config, workers=3, note=notes.append)
     assert report == out / "report.html"
-    assert pairs == {PHOTOGRAPHS: 3, SCENES: 2, DEAD_LEAVES: 2}
+    assert (notes, overlap) == ([], "")  # without test photographs none is trained on
+    assert pairs == {PHOTOGRAPHS: max(count, 3), SCENES: count, DEAD_LEAVES: count}
     order = [(source, seed) for source in SOURCES[config.kind] for seed in config.seeds]
     trained = [given for name, given, _ in calls if name == "train"]
     assert [(data, run, settings.seed) for data, run, settings in trained] == [
@@ -387,15 +409,22 @@ def test_every_source_is_trained_on_with_every_seed_and_made_with_the_first(
         (out / "data" / source, pairs[source], 5, 3) for source, _ in order
     ]
     drawn = [(*given, options) for name, given, options in calls if name == "write_dead_leaves"]
-    assert {(path, count, each["width"], each["height"], each["seed"]) for path, count, each in drawn} == {
-        (out / "dead-leaves", 2, 128, 96, 5)
+    assert {(path, number, each["width"], each["height"], each["seed"]) for path, number, each in drawn} == {
+        (out / "dead-leaves", count, 128, 96, 5)
     }
     ((rows, written),) = [given for name, given, _ in calls if name == "write_results"]
-    assert written == out / "results.json"
-    assert [row[:3] for row in rows[:2]] == [("out", "baselines", name) for name in ("noisy", "classical")]
-    assert rows[2:] == [
-        ("measured", f"{source}-seed{seed}", f"{source}-seed{seed}", f"{pairs[source]} pairs from {source}")
-        for source, seed in order
+    ((images, written_images),) = [given for name, given, _ in calls if name == "write_images"]
+    assert (written, written_images) == (out / "results.json", out / "images.csv")
+    assert shown == [rows, images]
+    names = [f"{source}-seed{seed}" for source, seed in order]
+    assert images == ["baselines", *names]
+    assert rows == [
+        ("out", "baselines", "noisy", "", NOISY.denoise),
+        ("out", "baselines", "classical", "", CLASSICAL.denoise),
+        *(
+            ("measured", name, name, f"{pairs[source]} pairs from {source}", networks[out / "runs" / name])
+            for name, (source, _) in zip(names, order, strict=True)
+        ),
     ]
 
 
@@ -503,6 +532,48 @@ def test_a_test_set_of_another_noise_than_the_camera_has_now_is_not_measured_on(
         with pytest.raises(FsidError, match=rf"camera\.yaml: says another noise than that which {path} was"):
             _testsets(tmp_path, config, bar)
         shutil.rmtree(path)
+
+
+def test_all_are_measured_on_materials_in_lux_and_on_every_folder_of_photographs(tmp_path: Path, monkeypatch):
+    """As large and as many as the experiment says, of its camera; nothing is drawn or captured here."""
+    module, calls = "fsid.evaluate.experiments", []
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "one" / "kept").mkdir(parents=True)
+    (tmp_path / "two").mkdir()
+    save_profile(tmp_path / "camera.yaml", load_profile("galaxy-s22"))
+    config = replace(
+        scale_config("ablation", "cpu"),
+        **{"camera": "camera.yaml", "seeds": (5,), "tests": ("one/kept", str(tmp_path / "two"))},
+        **{"materials_scenes": 4, "test_width": 640, "test_height": 320},
+    )
+
+    def drawn(path, **options):
+        del options["progress"]
+        calls.append((path, options))
+
+    def captured(folders, path, **options):
+        drawn(path, folders=folders, **options)
+
+    monkeypatch.setattr(f"{module}.simulated_testset", drawn)
+    monkeypatch.setattr(f"{module}.photo_testset", captured)
+    written_before_digests = TestSet("galaxy-s22", ("iso800",), (TestImage("i", "a"),), 0, "")
+    monkeypatch.setattr(f"{module}.read_testset", lambda path: written_before_digests)
+    names = ("materials", "kept", "two")
+    paths = [tmp_path / "out" / "testsets" / name for name in names]
+    bar = partial(progress_bar, quiet=True)
+    assert _testsets(tmp_path / "out", config, bar) == paths
+    of_all = {"camera": "camera.yaml"}
+    isos = of_all | {"isos": (800, 1600, 3200, 6400)}
+    assert calls == [
+        (paths[0], of_all | {"scenes": 4, "width": 640, "height": 320, "seed": 1000}),
+        (paths[1], isos | {"folders": [Path("one/kept")]}),
+        (paths[2], isos | {"folders": [tmp_path / "two"]}),
+    ]
+    for path in paths:
+        path.mkdir(parents=True)
+        (path / "testset.json").touch()
+    assert _testsets(tmp_path / "out", config, bar) == paths
+    assert len(calls) == 3  # what is there stays
 
 
 @pytest.mark.parametrize(
