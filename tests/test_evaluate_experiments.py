@@ -42,7 +42,7 @@ from fsid.evaluate.results import ImageRow, read_images, write_images
 from fsid.evaluate.resumable_folder import claimed
 from fsid.evaluate.simulated import LUXES
 from fsid.evaluate.testset import TestImage, TestSet, levels_of
-from fsid.evaluate.train_test_overlap import copies_in_training
+from fsid.evaluate.train_test_overlap import copies_in_training, overlap_note
 from fsid.sensor import load_profile, save_profile
 from fsid.yaml_json import read_yaml
 
@@ -267,6 +267,48 @@ def test_test_photographs_that_were_trained_on_are_found_as_copies(photos: Path,
     tests = [turned, smaller, blank, other, tmp_path / "missing.png"]
     assert copies_in_training(tests, [*training[:2], blank], 2) == []
     assert copies_in_training(tests, [*training, blank], 2) == [(smaller, training[2])]
+
+
+def test_a_copy_is_known_whatever_its_light_and_no_picture_by_a_part_that_it_shares(
+    photos: Path, tmp_path: Path
+):
+    """Darker, tinted, foggy; with a tenth of another picture in it, not with a fifth (its distance is 0.30).
+    What is a level brighter on one side than on the other is flat."""
+    training = sorted(photos.iterdir())
+    first, other = (np.asarray(Image.open(path), float) for path in training[:2])
+    flat = np.full_like(first, 90)
+    flat[:, :100] = 91
+    made = {
+        "dark": first * 0.5,
+        "tinted": first * 0.8 + (50, 0, 20),
+        "foggy": first * 0.2 + 100,
+        "a-tenth": 0.9 * first + 0.1 * other,
+        "a-fifth": 0.8 * first + 0.2 * other,
+        "flat": flat,
+    }
+    for name, pixels in made.items():
+        Image.fromarray(np.uint8(pixels.round())).save(tmp_path / f"{name}.png")
+    tests = sorted(tmp_path.iterdir())
+    found = copies_in_training(tests, [tmp_path / "flat.png", *reversed(training)], 1)
+    assert {test.stem: rival for test, rival in found} == dict.fromkeys(
+        ("a-tenth", "dark", "foggy", "tinted"), training[0]
+    )
+
+
+def test_what_was_trained_on_is_counted_set_by_set(photos: Path, tmp_path: Path):
+    training = sorted(photos.iterdir())
+    paths = {name: tmp_path / name for name in ("a.png", "b.png", "c.png", "d.png", "e.png")}
+    Image.fromarray(data.astronaut()[:160, :200]).save(paths["a.png"])
+    Image.fromarray(data.astronaut()[200:360, :200]).save(paths["e.png"])
+    for name, path in zip("bcd", training, strict=True):
+        shutil.copy(path, paths[f"{name}.png"])
+    a, b, c, d, e = paths.values()
+    last = "1 of 1 test photograph of last are trained on by the real rival, which flatters it"
+    assert overlap_note({"one": [a, b, c], "none": [e], "last": [d]}, training, 1) == (
+        "2 of 3 test photographs of one are trained on by the real rival, which flatters it "
+        f"(b.png is its coffee-0.png); {last} (d.png is its coffee-2.png)"
+    )
+    assert overlap_note({"one": [a, e]}, training, 1) == ""
 
 
 def test_a_demo_is_gone_on_with_by_the_same_command_alone(tmp_path: Path, refused):
