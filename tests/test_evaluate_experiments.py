@@ -24,7 +24,7 @@ from fsid.cli.progress import progress_bar
 from fsid.config import save_settings
 from fsid.errors import FsidError
 from fsid.evaluate.compare import CLASSICAL, NOISY, Method, summarise
-from fsid.evaluate.dead_leaves import RADIUS_PX, dead_leaves_rand, write_dead_leaves
+from fsid.evaluate.dead_leaves import RADIUS_PX, _put, dead_leaves_rand, write_dead_leaves
 from fsid.evaluate.demo import ISOS, DemoConfig, _copy_photographs
 from fsid.evaluate.experiment_config import DEAD_LEAVES, PHOTOGRAPHS, SCENES, SOURCES, scale_config
 from fsid.evaluate.experiment_report import gaps, write_experiment_report
@@ -768,23 +768,127 @@ def test_nothing_is_written_through_a_link(tmp_path: Path):
     assert mine.read_text() == "mine"
 
 
-def test_radii_of_dead_leaves_have_the_density_of_scale_invariance(monkeypatch):
-    """1 / r^3 per area between 4 and 64 texels: of the discs that reach a square of 128, P(radius > r) from
-    the integral of (128 + 2 r)^2 / r^3."""
+@pytest.mark.parametrize("height", [64, 8])
+def test_radii_of_dead_leaves_have_the_density_of_scale_invariance(monkeypatch, height: int):
+    """1 / r^3 per area between 4 and 64 texels: of the discs that reach h x 128 texels, P(radius > r) from
+    the integral of (h + 2 r) (128 + 2 r) / r^3."""
 
     def reaching(low: float) -> float:
         radii = np.linspace(low, 64, 20_000)
-        return float(np.trapezoid((128 + 2 * radii) ** 2 / radii**3, radii))
+        return float(np.trapezoid((2 * height + 2 * radii) * (128 + 2 * radii) / radii**3, radii))
 
     radii = []
 
     def put(rng, picture, bare, radius, colour):
         radii.append(radius)
-        return 0 if len(radii) < 4000 else bare.size
+        return 0 if len(radii) < 16_000 else bare.size
 
     monkeypatch.setattr("fsid.evaluate.dead_leaves._put", put)
-    dead_leaves_rand(np.random.default_rng(0), 64, 64)
+    dead_leaves_rand(np.random.default_rng(0), height, 64)
     assert 4 <= min(radii) < max(radii) <= 64
     for radius in (5.0, 8.0, 16.0, 32.0):
         expected = reaching(radius) / reaching(4.0)
-        assert np.mean(np.array(radii) > radius) == pytest.approx(expected, abs=0.03)
+        assert np.mean(np.array(radii) > radius) == pytest.approx(expected, abs=0.01)
+
+
+def test_discs_lie_as_often_on_the_corners_of_a_picture_as_on_its_middle(monkeypatch):
+    """Of 8 texels, on 32 x 32: each covers a texel with probability pi 8^2 / (32 + 2 x 8)^2."""
+    hits, discs, real = np.zeros((32, 32)), [], _put
+
+    def put(rng, picture, bare, radius, colour):
+        alone = np.ones_like(bare)
+        discs.append(real(rng, picture, alone, radius, colour))
+        assert discs[-1] == np.sum(~alone)
+        hits[...] += ~alone
+        return 0 if len(discs) < 4000 else bare.size
+
+    monkeypatch.setattr("fsid.evaluate.dead_leaves._put", put)
+    monkeypatch.setattr("fsid.evaluate.dead_leaves.RADIUS_PX", (4.0, 4.0001))
+    dead_leaves_rand(np.random.default_rng(0), 16, 16)
+    np.testing.assert_allclose(hits / 4000, np.pi * 64 / 48**2, atol=0.025)
+    assert hits.mean() / 4000 == pytest.approx(np.pi * 64 / 48**2, abs=0.002)
+
+
+def test_dead_leaves_are_discs_that_hide_what_comes_after_them(monkeypatch):
+    """Of 8 px, each of a colour of its own: none reaches farther, a few are whole, and all is covered."""
+    monkeypatch.setattr("fsid.evaluate.dead_leaves.RADIUS_PX", (8.0, 8.0001))
+    monkeypatch.setattr("fsid.evaluate.dead_leaves.OVERSAMPLING", 1)
+    monkeypatch.setattr("fsid.evaluate.dead_leaves.SHADED_SHARE", 0.0)
+    number = np.arange(1_000_000, dtype=np.float32)
+    palette = np.stack([number // 1000, number % 1000, np.zeros_like(number)], axis=-1) / 1024
+    monkeypatch.setattr("fsid.evaluate.dead_leaves._palette_rand", lambda rng: palette)
+    picture = dead_leaves_rand(np.random.default_rng(0), 100, 150)
+    assert picture.shape == (100, 150, 3)
+    bare = np.abs(picture - palette.mean(axis=0)).max(-1) < 1e-4
+    assert 0 < bare.sum() <= 0.0005 * bare.size
+    assert picture.max(-1).min() > 0
+    places = np.argwhere(~bare)
+    _, owner, areas = np.unique(picture[~bare], axis=0, return_inverse=True, return_counts=True)
+    assert areas.max() == pytest.approx(np.pi * 64, abs=10)
+    assert np.sum(areas > 0.97 * np.pi * 64) >= 5
+    for i in range(len(areas)):
+        mine = places[owner.ravel() == i]
+        assert np.ptp(mine, axis=0).max() <= 16
+        if areas[i] > 0.97 * np.pi * 64:
+            middle = (mine.min(0) + mine.max(0)) / 2
+            assert np.linalg.norm(mine - middle, axis=1).max() <= 8.8
+
+
+def test_half_of_dead_leaves_fade_evenly_by_at_most_two_fifths(monkeypatch):
+    """From the middle of a disc to its edge, as all three colours do: a plane over its pixels."""
+    monkeypatch.setattr("fsid.evaluate.dead_leaves.RADIUS_PX", (10.0, 10.0001))
+    monkeypatch.setattr("fsid.evaluate.dead_leaves.OVERSAMPLING", 1)
+    share = np.arange(1, 4001, dtype=np.float32) / 4001
+    palette = np.stack([0.5 * share, 0.5 * (1 - share), np.zeros_like(share)], axis=-1)
+    monkeypatch.setattr("fsid.evaluate.dead_leaves._palette_rand", lambda rng: palette)
+    picture = dead_leaves_rand(np.random.default_rng(1), 120, 160)
+    sums = picture.sum(-1)
+    number = (picture[..., 0] / np.maximum(sums, 1e-9) * 4001).round().astype(int)
+    slopes = []
+    for i, area in zip(*np.unique(number, return_counts=True), strict=True):
+        y, x = np.nonzero(number == i)
+        if area < 150 or max(np.ptp(x), np.ptp(y)) > 20:
+            continue
+        plane = np.stack([x - x.mean(), y - y.mean(), np.ones(len(x))], axis=-1)
+        fit = np.linalg.lstsq(plane, sums[y, x].astype(float))[0]
+        np.testing.assert_allclose(plane @ fit, sums[y, x], atol=1e-4)
+        slopes.append(np.hypot(*fit[:2]) * 10 / 0.5)
+    slopes = np.array(slopes)
+    assert len(slopes) >= 20
+    assert slopes.max() == pytest.approx(0.36, abs=0.05)
+    assert 0.25 < np.mean(slopes > 1e-3) < 0.75
+
+
+def test_a_pixel_of_dead_leaves_is_the_mean_of_its_texels(monkeypatch):
+    monkeypatch.setattr("fsid.evaluate.dead_leaves.SHADED_SHARE", 0.0)
+    pixels = dead_leaves_rand(np.random.default_rng(0), 24, 32)
+    monkeypatch.setattr("fsid.evaluate.dead_leaves.RADIUS_PX", tuple(2 * radius for radius in RADIUS_PX))
+    monkeypatch.setattr("fsid.evaluate.dead_leaves.OVERSAMPLING", 1)
+    texels = dead_leaves_rand(np.random.default_rng(0), 48, 64)
+    by_hand = (texels[::2, ::2] + texels[1::2, ::2] + texels[::2, 1::2] + texels[1::2, 1::2]) / 4
+    np.testing.assert_allclose(pixels, by_hand, atol=1e-6)
+
+
+def test_dead_leaves_of_a_folder_differ_by_number_and_seed_and_are_drawn_once(tmp_path: Path):
+    progress = []
+    write_dead_leaves(
+        tmp_path / "a", 3, height=32, width=48, seed=1, progress=lambda *done: progress.append(done)
+    )
+    assert (progress[0], progress[-1]) == ((0, 3), (3, 3))
+    write_dead_leaves(tmp_path / "b", 2, height=32, width=48, seed=1)
+    write_dead_leaves(tmp_path / "c", 1, height=32, width=48, seed=2)
+    files = sorted(tmp_path.rglob("*.png"))
+    assert [str(file.relative_to(tmp_path)) for file in files] == [
+        *("a/000000.png", "a/000001.png", "a/000002.png", "b/000000.png", "b/000001.png", "c/000000.png")
+    ]
+    a, b, _, again, same, other = (np.asarray(Image.open(file)) for file in files)
+    assert a.shape == (32, 48, 3)
+    np.testing.assert_array_equal(again, a)
+    np.testing.assert_array_equal(same, b)
+    assert (a != b).any()
+    assert (a != other).any()
+    mean = dead_leaves_rand(np.random.default_rng(np.random.SeedSequence(1, spawn_key=(1,))), 32, 48)
+    np.testing.assert_allclose(b / 255, mean, atol=0.5001 / 255)
+    Image.new("RGB", (48, 32)).save(files[1])
+    write_dead_leaves(tmp_path / "a", 3, height=32, width=48, seed=1)
+    assert not np.asarray(Image.open(files[1])).any()
