@@ -9,6 +9,7 @@ import shutil
 import struct
 from collections.abc import Callable
 from html.parser import HTMLParser
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -31,17 +32,25 @@ from fsid.evaluate import (
     write_comparison,
     write_results,
 )
-from fsid.evaluate.compare import detailed_window
+from fsid.evaluate.compare import Comparison, Crops, detailed_window, summarise
 from fsid.evaluate.comparison_report import comparison_sections
 from fsid.evaluate.metrics import ssim
 from fsid.evaluate.models import model_names
-from fsid.evaluate.report import METRICS, level_label, write_report
-from fsid.evaluate.results import MOST_DB, Row, confidence
-from fsid.evaluate.testset import staged, write_testset
+from fsid.evaluate.report import METRICS, level_label, method_label, write_report
+from fsid.evaluate.results import (
+    MOST_DB,
+    ImageRow,
+    Row,
+    confidence,
+    perfect_note,
+    read_images,
+    write_images,
+)
+from fsid.evaluate.testset import TestImage, TestSet, staged, write_testset
 from fsid.files import write_atomically
 from fsid.sensor import Raw, develop, read_raw, write_dng
 from fsid.sensor.gain_maps import shading_gains
-from fsid.sensor.metadata import OPCODES_2, Metadata
+from fsid.sensor.metadata import OPCODES_2, Metadata, exposure_metadata
 from fsid.sensor.tiff import Tag
 
 
@@ -111,13 +120,13 @@ def test_a_report_shows_some_of_many_images(
 
 
 def test_figures_are_those_of_their_frames_and_sets(tmp_path: Path):
-    """Two sets of one image and two frames: each metric of its own pictures, the crop that of the first."""
+    """Two sets of one image and three frames: each metric of its own pictures, the crop that of the first."""
     root = tmp_path / "set"
     made = simulated_testset(
         root,
         camera="pixel6",
         isos=[3200],
-        frames=2,
+        frames=3,
         scenes=1,
         width=64,
         height=64,
@@ -127,7 +136,7 @@ def test_figures_are_those_of_their_frames_and_sets(tmp_path: Path):
     expected = {}
     for image, crop in zip(made.images, found.crops, strict=True):
         truth = read_raw(made.clean(root, image, "iso3200"))
-        frames = [read_raw(made.noisy(root, image, "iso3200", n)) for n in range(2)]
+        frames = [read_raw(made.noisy(root, image, "iso3200", n)) for n in range(3)]
         figures = [
             (psnr(f.mosaic, truth.mosaic), psnr(develop(f), develop(truth)), ssim(develop(f), develop(truth)))
             for f in frames
@@ -270,6 +279,101 @@ def test_a_table_names_levels_and_marks_the_best(small_set: Path):
     assert level_label("isolated") == "isolated"
 
 
+def test_every_figure_of_a_comparison_is_in_its_place(monkeypatch):
+    """Against sums by hand: two images of one set and one of another, two levels, three methods."""
+    plots, pictures = [], {}
+    monkeypatch.setattr(
+        "fsid.evaluate.comparison_report.plot", lambda figure, caption: plots.append(figure) or caption
+    )
+    monkeypatch.setattr(
+        "fsid.evaluate.comparison_report.picture",
+        lambda pixels, caption, pixelated: pictures.setdefault(caption, pixels) is None or caption,
+    )
+    rng = np.random.default_rng(0)
+    names, levels = ("mine", "noisy", "other"), ("iso800", "2lux")
+    members = (("s", "a"), ("s", "b"), ("t", "c"))
+    values = {key: rng.lognormal(3, 0.2, 3) for key in product(names, levels, members)}
+    images = [ImageRow(m, level, *member, *figures) for (m, level, member), figures in values.items()]
+    testset = TestSet("pixel6", levels, tuple(TestImage(name, s) for s, name in members), 0, "")
+    others = [
+        dataclasses.replace(images[0], set="u"),
+        dataclasses.replace(images[0], image="z"),
+    ]  # of another test set
+    rows = summarise(testset, [Method(name, "", NOISY.denoise) for name in names], [*images, *others])
+    shown = {name: rng.random((4, 6, 3)) for name in names}
+    truth = rng.random((4, 6, 3))
+    crops = (Crops("a", "iso800", truth, shown, {"mine": 31.234, "noisy": 20.0, "other": 33.0}),)
+    found = comparison_sections(Comparison(testset, tuple(rows), tuple(images), crops))
+    whole, single, before_after, side_by_side = found
+
+    def mean(name: str, level: str, metric: int, among: tuple = ("s", "t")) -> float:
+        return np.mean([values[name, level, member][metric] for member in members if member[0] in among])
+
+    def half(name: str, level: str, metric: int) -> float:
+        """t of two sets is 12.706; n / (n - 1) is 2, of the sums of departures."""
+        of_s = sum(values[name, level, member][metric] - mean(name, level, metric) for member in members[:2])
+        return 12.7062 * np.sqrt(2 * 2 * of_s**2) / 3
+
+    assert whole.text.startswith("All sets together: means over 3 images, ± half the width of the 95 %")
+    for metric, (table, (_, title, form)) in enumerate(zip(whole.tables, METRICS, strict=True)):
+        means = np.array([[mean(name, level, metric) for level in levels] for name in names])
+        means = np.column_stack([means, means.mean(1)])
+        assert (table.title, table.head) == (title, ("", "ISO 800", "2 lux", "mean"))
+        assert table.best == {(int(means[:, j].argmax()), j + 1) for j in range(3)}
+        for row, name, each in zip(table.rows, names, means, strict=True):
+            cells = [f"{each[j]:{form}} ± {half(name, levels[j], metric):{form}}" for j in (0, 1)]
+            assert row == (method_label(name), *cells, f"{each[2]:{form}}")
+        for line, each in zip(plots[0].axes[metric].lines, means, strict=True):
+            np.testing.assert_allclose(line.get_ydata(), each[:2])
+    assert [line.get_label() for line in plots[0].axes[0].lines] == ["mine", "noisy input", "other"]
+    assert [table.title for table in single.tables] == ["s, 2 images", "t, 1 image"]
+    for table in single.tables:
+        among = (table.title[0],)
+        raw = np.array([[mean(name, level, 0, among) for level in levels] for name in names])
+        assert table.best == {(int(raw[:, j].argmax()), j + 1) for j in (0, 1)}
+        for row, name in zip(table.rows, names, strict=True):
+            each = [[mean(name, level, metric, among) for metric in range(3)] for level in levels]
+            assert row == (method_label(name), *(f"{r:.2f} / {p:.2f} / {s:.3f}" for r, p, s in each))
+    assert before_after.text.startswith("Of 1 of the 3 images. Drag the border. Left of it the first method")
+    (((slider,),),) = [before_after.sliders]
+    assert (slider.before, slider.after) == ("a, ISO 800: mine", "a, ISO 800: other")
+    captions = ("mine 31.23 dB", "noisy input 20.00 dB", "other 33.00 dB", "truth: a, ISO 800")
+    errors = ("error of mine", "error of noisy input", "error of other", "no error")
+    assert side_by_side.pictures == (captions, errors)
+    for name, caption, error in zip(names, captions, errors, strict=False):
+        np.testing.assert_array_equal(pictures[caption], shown[name])
+        np.testing.assert_allclose(pictures[error], 8 * np.abs(shown[name] - truth))
+    np.testing.assert_array_equal(pictures[captions[3]], truth)
+    assert not pictures["no error"].any()
+
+
+def test_crops_are_shown_upright_and_progress_is_that_of_captures(small_set: Path, tmp_path: Path):
+    """Orientation 6 of TIFF: what was held turned left is turned right."""
+    shutil.copytree(small_set, tmp_path / "set")
+    testset = read_testset(small_set)
+    plain = compare(small_set, [NOISY], crop_levels=["iso800"], crop_px=64).crops[0]
+    clean = testset.clean(tmp_path / "set", testset.images[0])
+    write_dng(clean, dataclasses.replace(read_raw(clean), metadata=exposure_metadata(orientation=6)))
+    done = []
+    found = compare(
+        tmp_path / "set",
+        [NOISY],
+        crop_levels=["iso800"],
+        crop_px=64,
+        progress=lambda *each: done.append(each),
+    )
+    lying = (plain.truth, plain.by_method["noisy"])
+    for turned, pixels in zip((found.crops[0].truth, found.crops[0].by_method["noisy"]), lying, strict=True):
+        np.testing.assert_allclose(turned, np.rot90(pixels, -1), atol=0.01)
+        assert np.abs(turned - pixels).max() > 0.1
+    assert (done[0], done[-1]) == ((0, 6), (6, 6))
+    assert sorted({each for each, _ in done}) == list(range(7))
+    with pytest.raises(FsidError, match="has no level iso50"):
+        compare(small_set, [NOISY], crop_levels=["iso800", "iso50"])
+    with pytest.raises(FsidError, match="noisy: two models have this name"):
+        compare(small_set, [NOISY, CLASSICAL, NOISY])
+
+
 def test_a_capture_that_a_method_refuses_is_named(small_set: Path, tmp_path: Path):
     shutil.copytree(small_set, tmp_path / "set")
     testset = read_testset(small_set)
@@ -304,6 +408,7 @@ def test_a_crop_is_of_the_edges_of_things_and_not_of_the_finest_texture():
     assert (rows, columns) == (slice(40, 80), slice(100, 140))
     grey = gaussian_filter(picture.mean(2), 3)
     assert detail == pytest.approx(np.hypot(*np.gradient(grey))[rows, columns].mean())
+    assert detailed_window(picture.swapaxes(0, 1), 40)[0] == (slice(100, 140), slice(40, 80))
     assert detailed_window(picture, 500)[0] == (slice(0, 90), slice(0, 150))
 
 
@@ -346,7 +451,9 @@ def test_pictures_of_one_set_are_no_independent_draws():
 
 
 def test_the_report_says_what_its_intervals_count(small_set: Path, tmp_path: Path):
-    assert "confidence interval; bold" in comparison_sections(compare(small_set, [NOISY]))[0].text
+    of_one = comparison_sections(compare(small_set, [NOISY]))[0]
+    assert "confidence interval; bold" in of_one.text
+    assert all(" ± " in cell for cell in of_one.tables[0].rows[0][1:3])
     shutil.copytree(small_set, tmp_path / "set")
     testset = read_testset(small_set)
     named = [dataclasses.replace(image, set=f"s{i // 2}") for i, image in enumerate(testset.images)]
@@ -545,6 +652,38 @@ def test_a_confidence_interval_is_student_s():
     """Of 0 and 2: t = 12.706 with one degree of freedom, standard error 1; of 1, 2, 3: 4.303 / sqrt 3."""
     assert confidence([0.0, 2.0]) == pytest.approx(12.706, abs=1e-3)
     assert confidence([1.0, 2.0, 3.0]) == pytest.approx(4.3027 / np.sqrt(3), abs=1e-3)
+    # sets of two and of one: sums of departures from the mean 3 are -4 and 4, and n / (n - 1) is 2
+    assert confidence([0.0, 2.0, 7.0], ["a", "a", "b"]) == pytest.approx(12.706 * 8 / 3, abs=3e-3)
+    assert np.isnan([confidence([30.0]), confidence([30.0, np.nan]), confidence([])]).all()
+
+
+def test_figures_that_are_written_have_four_digits(tmp_path: Path):
+    row = Row("m", "t", "c", "iso50", "s", 2, 31.123456, float("nan"), 0.98766)
+    write_results([row], tmp_path / "results.json")
+    (written,) = json.loads((tmp_path / "results.json").read_text())
+    assert written == {
+        **{"model": "m", "training": "t", "camera": "c", "level": "iso50", "set": "s", "n": 2},
+        **{"psnr_raw": 31.1235, "psnr": None, "ssim": 0.9877},
+    }
+    images = [
+        ImageRow("m", "iso50", "s, t", 'a "b"\r\n', 31.123456, float("inf"), 0.98766),
+        ImageRow("n", "iso50", "s", "b", 40.0, 30.0, 0.5),
+    ]
+    write_images(images, tmp_path / "images.csv")
+    assert read_images(tmp_path / "images.csv") == [
+        dataclasses.replace(images[0], psnr_raw=31.1235, ssim=0.9877),
+        images[1],
+    ]
+
+
+def test_results_without_error_are_counted_in_raw_and_after_develop():
+    rows = [
+        ImageRow("first", "iso50", "s", "a", 99.9, 99.9, 1.0),
+        ImageRow("second", "iso100", "s", "b", 50.0, 100.0, 1.0),
+        ImageRow("third", "iso50", "s", "c", 100.0, 60.0, 1.0),
+    ]
+    assert perfect_note(rows).startswith("2 results without error (second of b at iso100 for one): ")
+    assert perfect_note(rows[:1]) == ""
 
 
 def test_two_cannot_fill_one_folder(photos: Path, tmp_path: Path):

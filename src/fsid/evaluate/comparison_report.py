@@ -52,7 +52,7 @@ def comparison_sections(comparison: Comparison) -> list[Section]:
     some = f"Of {shown} of the {count} images. " if shown < count else ""
     before_after = Section(
         "Before and after",
-        f"{some}Drag the border. Left of it the noisy input, right of it the last method of the tables.",
+        f"{some}Drag the border. Left of it the first method of the tables, right of it the last.",
         sliders=tuple(_chunks([_slider(crops) for crops in comparison.crops], 3)),
     )
     side_by_side = Section(
