@@ -246,11 +246,21 @@ def test_a_narrow_terminal_cuts_no_figure_of_a_table(
     assert "…" not in listed
 
 
-def test_a_help_breaks_lines_where_its_terminal_does(capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.fixture
+def help_of(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
+    """The help of a command, or of all where none is named."""
+
+    def told(*command: str) -> str:
+        with pytest.raises(SystemExit):
+            cli.main([*command, "--help"])
+        return capsys.readouterr().out
+
+    return told
+
+
+def test_a_help_breaks_lines_where_its_terminal_does(help_of: Callable[..., str]) -> None:
     """And not where the source does."""
-    with pytest.raises(SystemExit):
-        cli.main(["evaluate", "--help"])
-    text = capsys.readouterr().out
+    text = help_of("evaluate")
     assert "images.csv (every image) and report.html (tables, plot, before and after, error maps)." in text
     assert "shipped network (nafnet-small); may be given several" in text
 
@@ -272,49 +282,39 @@ def test_a_help_breaks_lines_where_its_terminal_does(capsys: pytest.CaptureFixtu
         "train DATA",
     ],
 )
-def test_the_usage_names_what_goes_where(usage: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_usage_names_what_goes_where(usage: str, help_of: Callable[..., str]) -> None:
     """As the README does; all places were called PATH."""
     command, _, places = usage.partition(" ")
-    with pytest.raises(SystemExit):
-        cli.main([command, "--help"])
-    told = " ".join(capsys.readouterr().out.split())
+    told = " ".join(help_of(command).split())
     assert re.match(rf"usage: fsid {command} \[-h\] (\[[A-Z]+ OPTIONS\] )?{re.escape(places)} ", told)
 
 
 @pytest.mark.parametrize("command", cli.COMMANDS)
-def test_the_help_of_an_option_is_free_of_python(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_help_of_an_option_is_free_of_python(command: str, help_of: Callable[..., str]) -> None:
     """--iso FLOAT, where it was --iso {None}|FLOAT (default: None); switches and empty lists likewise."""
-    with pytest.raises(SystemExit):
-        cli.main([command, "--help"])
-    assert not re.search(r"None|False|default: *\)|default: *''", capsys.readouterr().out)
+    assert not re.search(r"None|False|default: *\)|default: *''", help_of(command))
 
 
-def test_the_list_of_commands_has_a_sentence_of_each(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_list_of_commands_has_a_sentence_of_each(help_of: Callable[..., str]) -> None:
     """And their help all the rest, whichever is asked for first."""
-    for arguments, more in (["--help"], False), (["demo", "--help"], True), (["--help"], False):
-        with pytest.raises(SystemExit):
-            cli.main(arguments)
-        told = " ".join(capsys.readouterr().out.split())
+    for command, more in ((), False), (("demo",), True), ((), False):
+        told = " ".join(help_of(*command).split())
         assert "Render scenes, train a small network" in told
         assert ("Running it again continues it." in told) is more
 
 
-def test_defaults_that_are_figures_are_told(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit):
-        cli.main(["preview", "--help"])
-    text = capsys.readouterr().out
+def test_defaults_that_are_figures_are_told(help_of: Callable[..., str]) -> None:
+    text = help_of("preview")
     assert "Number of scenes. (default: 12)" in text
     assert "Seed of the dataset. (default: 0)" in text
 
 
 @pytest.mark.parametrize("command", ["generate", "preview"])
 def test_the_paper_s_names_of_variants_are_in_the_help_alone(
-    command: str, capsys: pytest.CaptureFixture[str]
+    command: str, help_of: Callable[..., str]
 ) -> None:
     """No option takes them, so the guide to the settings calls variants what the option calls them."""
-    with pytest.raises(SystemExit):
-        cli.main([command, "--help"])
-    assert "v1 to v4" in " ".join(capsys.readouterr().out.split())
+    assert "v1 to v4" in " ".join(help_of(command).split())
     guide = Path(__file__).resolve().parents[1] / "docs" / "scenes.md"
     assert not re.search(r"\bv[1-4]\b", guide.read_text(encoding="utf-8"))
 

@@ -141,17 +141,18 @@ def _terminate(number: int, frame: FrameType | None) -> None:
 
 
 def _run(arguments: Sequence[str] | None) -> None:
-    if (sys.argv[1:] if arguments is None else list(arguments)) == ["--version"]:
+    given = sys.argv[1:] if arguments is None else list(arguments)
+    if given == ["--version"]:
         print(f"fsid {__version__}")
         return
     try:
-        _check_options(sys.argv[1:] if arguments is None else arguments)
-        with _documented((sys.argv[1:] if arguments is None else list(arguments))[:1]):
+        _check_options(given)
+        with _documented(given[:1]):
             tyro.extras.subcommand_cli_from_dict(
                 COMMANDS,
                 prog="fsid",
                 description=DESCRIPTION,
-                args=arguments,
+                args=given,
                 config=(tyro.conf.FlagCreatePairsOff,),
                 registry=AS_GIVEN,
             )
@@ -174,20 +175,20 @@ def _run(arguments: Sequence[str] | None) -> None:
         _fail(str(error))
     except KeyboardInterrupt:
         what, code = ("terminated", 128 + _received[0]) if _received else ("interrupted", 130)
-        goes_on = set(sys.argv[1:2] if arguments is None else arguments[:1]) & RESUMABLE
+        goes_on = set(given[:1]) & RESUMABLE
         hint = "; the same command goes on from what is finished" if goes_on else ""
         _tell(Text(f"fsid: {what}{hint}"))
         sys.exit(code)
 
 
 @contextmanager
-def _documented(given: Sequence[str]) -> Iterator[None]:
-    """Inside, commands say what the help shows: all of the given one, the first line of the others."""
+def _documented(asked_for: Sequence[str]) -> Iterator[None]:
+    """Inside, commands say what the help shows: all of those asked for, the first line of the others."""
     before = {name: command.__doc__ or "" for name, command in COMMANDS.items()}
     try:
         for name, command in COMMANDS.items():
             document = _flowing(before[name])
-            command.__doc__ = document if name in given else document.partition("\n")[0]
+            command.__doc__ = document if name in asked_for else document.partition("\n")[0]
             without_empty_defaults(command)
         yield
     finally:
