@@ -47,6 +47,15 @@ def test_noise_that_integers_do_not_show_is_said_to_be_uncertain(level, tau, rng
     assert found.variance_error > 0.002
 
 
+@pytest.mark.parametrize(
+    ("level", "tau"), [(64.2, 0.1), (64.3, 0.14), (64.6, 0.14), (63.7, 0.1), (64.35, 0.2)]
+)
+def test_the_level_of_noise_that_reaches_one_integer_alone_is_not_the_mean(level, tau, rng):
+    mean, variance = stored(rng, np.full(PIXELS, level), tau)
+    assert abs(mean.mean() - level) > 0.1
+    assert dark_noise(mean, variance, FRAMES, 1023).level == pytest.approx(level, abs=0.06)
+
+
 @pytest.mark.parametrize("tau2", [0.1, 0.25, 0.5, 2.0])
 @pytest.mark.parametrize("places", [(0, 3), (0, 0.1), (0.2, 0.3)])
 def test_rounding_is_undone_wherever_the_pixels_lie(tau2, places, rng):
