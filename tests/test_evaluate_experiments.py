@@ -542,6 +542,14 @@ def test_sources_of_all_sizes_are_trained_on_alike(tmp_path: Path):
     assert _training(replace(config, network=str(network)), 3).shrink == (1, 2)
 
 
+def test_an_experiment_s_seeds_are_those_of_its_trainings():
+    config = replace(scale_config("ablation", "cpu"), train_settings=("seed=7", "batch=2"))
+    assert [(_training(config, seed).seed, _training(config, seed).batch) for seed in (0, 3)] == [
+        (0, 2),
+        (3, 2),
+    ]
+
+
 def test_rivals_differ_in_nothing_but_their_data(tmp_path: Path, refused):
     """A file of settings that was edited since: the others would be trained with what it says now."""
     network, out = tmp_path / "network.yaml", tmp_path / "out"
@@ -702,6 +710,15 @@ def test_frames_too_small_for_a_training_that_makes_them_smaller_are_refused_bef
     told = refused(*command, "--width", "200", "--height", "200")
     assert "1 of 8 pictures cannot be used" in told
     assert "icon-test.png" in told
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("setting", ["initial_weights: gone", "validation_photos: gone"])
+def test_what_a_network_s_file_names_is_looked_for_before_anything_is_made(setting: str, tmp_path, refused):
+    network = tmp_path / "network.yaml"
+    network.write_text(setting)
+    told = refused("experiment", "ablation", "-o", tmp_path / "out", *SMOKE, "--network", network)
+    assert "gone" in told
     assert not (tmp_path / "out").exists()
 
 

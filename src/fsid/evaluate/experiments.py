@@ -29,6 +29,7 @@ from fsid.dataset import (
 from fsid.dataset.photos import SMALLEST_PX
 from fsid.dataset.pictures import picture_faults, pictures_digest
 from fsid.denoise import TrainConfig, train, train_config
+from fsid.denoise.initial_weights import initial_network
 from fsid.denoise.run_folder import check_same_training
 from fsid.errors import FsidError, refuse_any
 from fsid.evaluate.compare import CLASSICAL, NOISY, Method, compare, summarise
@@ -136,6 +137,9 @@ def _check(out: Path, config: ExperimentConfig, bar: ProgressBar, workers: int) 
     photos = find_pictures(Path(config.photos)) if PHOTOGRAPHS in SOURCES[config.kind] else []
     if (out / "experiment.yaml").exists():
         return
+    initial_network(out, training, resume=False)
+    if training.validation_photos:
+        find_photos(training.validation_photos)
     faults, threads = [], min(workers, os.cpu_count() or 1)
     for name, pictures, smallest_px in (("tests", tests, 0), ("photographs", photos, least)):
         if pictures:
@@ -174,7 +178,7 @@ def _training(config: ExperimentConfig, seed: int) -> TrainConfig:
         ("iso_max", max(usual.iso_max, *isos)),
     ]
     steps = [f"steps={config.steps}"] if config.steps else []
-    training = train_config(config.network, [*noise, f"seed={seed}", *config.train_settings, *steps])
+    training = train_config(config.network, [*noise, *config.train_settings, f"seed={seed}", *steps])
     # scenes and photographs differ in size, and their trainings must not
     return training if training.shrink else replace(training, shrink=(1,))
 
