@@ -137,7 +137,8 @@ def _check(out: Path, config: ExperimentConfig, bar: ProgressBar, workers: int) 
     photos = find_pictures(Path(config.photos)) if PHOTOGRAPHS in SOURCES[config.kind] else []
     if (out / "experiment.yaml").exists():
         return
-    initial_network(out, training, resume=False)
+    first_run = _run_folder(out, SOURCES[config.kind][0], config.seeds[0])
+    initial_network(first_run, training, resume=False)
     if training.validation_photos:
         find_photos(training.validation_photos)
     faults, threads = [], min(workers, os.cpu_count() or 1)

@@ -108,8 +108,8 @@ def censored(below: np.ndarray, above: np.ndarray) -> tuple[np.ndarray, np.ndarr
 def _rare(mean: float, variance: float, pixels: int, frames: int) -> DarkNoise:
     """Noise that seldom reaches the next integer: how often it does so on both sides says where mu is.
 
-    A side that never shows bounds tau, and tau^2 may be anything below, mu what the other side then says;
-    unless that one shows so seldom that the difference is chance.
+    A side that never shows bounds tau: tau^2 may be anything below, and mu is what the other side says of the
+    middle of it; unless that one shows so seldom that the difference is chance.
     """
     samples, middle = pixels * frames, round(mean)
     off = mean - middle
@@ -118,10 +118,10 @@ def _rare(mean: float, variance: float, pixels: int, frames: int) -> DarkNoise:
     z = -ndtri(np.maximum(seen, least) / samples)
     tau = 1 / z.sum()
     tau2 = float(tau**2)
-    if seen.max() < least or (seen.min() < least and seen.max() > _BY_CHANCE):
-        level, half = mean, tau / np.sqrt(2)
-        if seen.max() >= least:
-            level = middle + (0.5 - z[0] * half if seen[0] > seen[1] else z[1] * half - 0.5)
+    if seen.max() < least:
+        return DarkNoise(mean, tau2 / 2 + ROUNDING_DN2, tau2 / np.sqrt(12))
+    if seen.min() < least and seen.max() > _BY_CHANCE:
+        level = middle + np.copysign(0.5 - z.min() * tau / np.sqrt(2), off)
         return DarkNoise(float(level), tau2 / 2 + ROUNDING_DN2, tau2 / np.sqrt(12))
     z_error = np.sqrt(np.maximum(seen, 1)) / samples * np.sqrt(2 * np.pi) * np.exp(z * z / 2)
     error = 2 * tau**3 * np.hypot(*z_error)
