@@ -87,13 +87,13 @@ def scale_config(kind: Kind, scale: str) -> ExperimentConfig:
             "network.width=8",
             "held_out=0",
             "batch=2",
-            "patch_px=24",  # of images of 48 packed pixels: pooled as a whole, not by pieces
+            "patch_px=24",  # of test images of 48 packed pixels, aligned: pooled as a whole, not by pieces
             "warmup_steps=2",
             "validate_every=1000",
         )
         return ExperimentConfig(
             kind, 4, 30, "nafnet-tiny", (0, 1), 128, 96, photos=photos, materials_scenes=1,
-            test_width=96, test_height=96, train_settings=tiny,
+            test_width=94, test_height=94, train_settings=tiny,
         )  # fmt: skip
     if scale == "cpu":
         return ExperimentConfig(kind, 800, 6000, "nafnet-tiny", (0, 1), 480, 270, photos=photos)
