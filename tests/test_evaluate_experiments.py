@@ -155,9 +155,10 @@ def test_every_figure_of_an_experiment_is_in_its_place(tmp_path: Path, monkeypat
     standing, whole, photos, single = written["sections"]
     assert [each.title for each in (whole, photos)] == ["all materials", "p"]
     rivals = [source for source in sources if source != "full"]
-    tables = iter(standing.tables)
+    tables, panels = iter(standing.tables), iter(figures.pop(0).axes)
     for rival, metric in product(rivals, (0, 1)):
-        table = next(tables)
+        table, panel = next(tables), next(panels)
+        assert panel.get_title() == table.title
         assert table.title.startswith(f"full - {rival}, PSNR {('in RAW', 'after develop')[metric]}")
         for row, name, members, levels in zip(
             table.rows, ("all materials", "p"), (materials, photographs), (luxes, isos), strict=True
@@ -169,6 +170,11 @@ def test_every_figure_of_an_experiment_is_in_its_place(tmp_path: Path, monkeypat
             ]
             shown = f"{medians[0]:+.2f} {medians[1]:+.2f}"
             assert row == (name, f"{np.mean(each):+.2f}", f"{min(each):+.2f} ({lowest})", shown)
+            place = [label.get_text() for label in panel.get_xticklabels()].index(name)
+            bar = panel.patches[place]
+            assert bar.get_x() + bar.get_width() / 2 == place
+            assert bar.get_height() == pytest.approx(np.mean(each))
+            np.testing.assert_allclose(panel.lines[place].get_xydata(), [(place, g) for g in each])
     for section, members, levels in ((whole, materials, luxes), (photos, photographs, isos)):
         for metric, table in enumerate(section.tables[:3]):
             form = ".3f" if metric == 2 else ".2f"

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -156,7 +157,10 @@ def _standing(results: _Results, names: Sequence[str]) -> Section:
         "and levels. Paired medians: of the differences image by image, mean of levels, one figure per seed. "
         "Below 0.05 dB a gap is nothing; 0.10 dB with the same sign in two seeds is real."
     )
-    return Section("Where the full variant stands", text, tables)
+    picture = plot(
+        _standing_plot(results, names), "means over images and seeds: a bar for each set, dots for its levels"
+    )
+    return Section("Where the full variant stands", text, tables, ((picture,),))
 
 
 def _gap_tables(
@@ -219,6 +223,24 @@ def _by_material(results: _Results, names: Sequence[str]) -> Section:
     head = (*map(level_label, results.levels[names[0]]), "mean")
     text = "Gaps by material, means over images and seeds. What each source comes to is in results.json."
     return Section("By material", text, _gap_tables(results, names, head, cells))
+
+
+def _standing_plot(results: _Results, names: Sequence[str]) -> Figure:
+    """A row per rival, a column per metric; bars for the gaps of sets, dots for those of their levels."""
+    rivals = results.rivals
+    figure = Figure(figsize=(8, 2.3 * len(rivals)), layout="constrained")
+    labels = [as_label(_set_label(name)) for name in names]
+    grid = figure.subplots(len(rivals), len(DECIBELS), sharey="row", squeeze=False)
+    for axes, (rival, (metric, title, _)) in zip(grid.flat, product(rivals, DECIBELS), strict=True):
+        for place, name in enumerate(names):
+            gap = results.gap(rival, name, metric)
+            axes.bar(place, gap.mean(), 0.5, color="C0", alpha=0.5)
+            axes.plot(np.full(len(gap), place), gap, ".", color="C0", markersize=4)
+        axes.axhline(0, color="grey", linewidth=0.8)
+        axes.set_xticks(range(len(names)), labels, fontsize=8, rotation=0 if len(names) < 6 else 30)
+        axes.set_title(f"full - {rival}, {title}", fontsize=9)
+        axes.grid(alpha=0.3, axis="y")
+    return figure
 
 
 def _gap_plot(results: _Results, name: str) -> Figure:
