@@ -21,6 +21,7 @@ from fsid.dataset.inspect import inspect
 from fsid.dataset.shards import read_records, read_samples
 from fsid.dataset.statistics import TITLES
 from fsid.errors import FsidError
+from fsid.scene import SceneConfig
 from fsid.yaml_json import read_yaml
 
 SETTINGS = ["width=64", "height=48", "texture_size=64", "supersampling=1", "scene.objects=[1,3]"]
@@ -188,16 +189,46 @@ def test_the_card_shows_what_others_wrote_as_text() -> None:
     assert shown == r"\<img src=x> (1), \[a](javascript:b) (1), c # d (1), phone_6+dirt (1) uses"
 
 
-def test_licences_of_meshes_are_counted_by_use(tmp_path: Path) -> None:
+def boxes(*files: Path) -> None:
     import trimesh
 
+    for file in files:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        trimesh.creation.box((0.3, 0.2, 0.1)).export(file)
+
+
+def test_licences_of_meshes_are_counted_by_use(tmp_path: Path) -> None:
     folders = [tmp_path / name for name in ("a", "b!c")]
-    for folder in folders:
-        folder.mkdir()
-        trimesh.creation.box((0.3, 0.2, 0.1)).export(folder / "box.glb")
+    boxes(*(folder / "box.glb" for folder in folders))
     (folders[0] / "LICENSE.txt").write_text("CC0 1.0 Universal\n")
+    (tmp_path / "LICENSE").write_text("MIT License\n")  # of what the folders lie in, not of the meshes
     most = 10**15  # so many cannot be counted one by one
     used = Counter({f"file:{folder / 'box.glb'}": n for folder, n in zip(folders, (most, 2), strict=True)})
-    stated, unknown = _sources(_Tally({"mesh": used}))
+    scene = SceneConfig(mesh_folders=tuple(map(str, folders)))
+    stated, unknown = _sources(_Tally({"mesh": used}), scene)
     assert f"{most} uses. Licences: CC0 ({most}) uses." in stated
     assert f"`{folders[1]}`: 2 uses. No licence file was found" in unknown
+
+
+def test_a_folder_of_sources_is_one_line_with_the_licences_nearest_to_its_files(tmp_path: Path) -> None:
+    meshes, textures = tmp_path / "meshes", tmp_path / "textures"
+    files = [meshes / "c.obj", meshes / "toys/b.obj", meshes / "furniture/chairs/a.obj"]
+    boxes(*files)
+    textures.mkdir()
+    for folder, text in (
+        (meshes / "toys", "CC BY 4.0"),
+        (meshes / "furniture", "CC0"),
+        (textures, "My own terms"),
+    ):
+        (folder / "LICENSE.txt").write_text(text)
+    used = Counter({f"file:{file}": n for file, n in zip(files, (1, 20, 300), strict=True)})
+    used["file:/gone/d.obj"] = 4  # of a folder that has moved since
+    materials = Counter({f"file:{textures / 'wood'}+dirt": 5})
+    scene = SceneConfig(mesh_folders=(str(meshes),), texture_folders=(str(textures),))
+    gone, stated, wood = _sources(_Tally({"mesh": used, "material": materials}), scene)
+    assert stated == (
+        f"- meshes from `{meshes}`: 321 uses. Licences: CC0 (300), CC BY 4.0 (20) uses. "
+        "With 1 of them no licence file was found: look at their source before you publish."
+    )
+    assert gone.startswith("- meshes from `/gone`: 4 uses. No licence file was found")
+    assert wood == f"- materials from `{textures}`: 5 uses. Licences: My own terms (5) uses."

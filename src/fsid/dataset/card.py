@@ -11,7 +11,7 @@ import io
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,7 @@ from PIL import Image
 
 from fsid import __version__
 from fsid.assets.file_names import PREFIX
-from fsid.assets.sources import split_source, survey_meshes
+from fsid.assets.sources import licence_beside, split_source, survey_meshes
 from fsid.dataset.config import DATASET_FILE, DatasetConfig
 from fsid.dataset.contact_sheet import grid
 from fsid.dataset.index import some_mosaics
@@ -30,6 +30,7 @@ from fsid.dataset.shards import read_records, records_of, shard_keys
 from fsid.errors import FsidError
 from fsid.files import check_file, write_atomically
 from fsid.plurals import counted
+from fsid.scene import SceneConfig
 
 CARD, SHEET = "README.md", "samples.png"
 _TITLE = "# RAW pairs made by FSID"
@@ -38,7 +39,7 @@ _FAMILIES_SHOWN = 200
 _MEASURED = 64
 """Images whose statistics the card states; `fsid inspect` measures more."""
 _SMALLEST_PX = 128
-_LICENCE_LETTERS = 20_000
+_LOOK = "look at their source before you publish."
 
 
 @dataclass
@@ -150,7 +151,7 @@ def _text(dataset: DatasetConfig, tally: _Tally, statistics: Sequence[str], comm
         "",
         "## Sources and licences",
         "",
-        *_sources(tally),
+        *_sources(tally, config.scene),
         *statistics,
     ]
     if command:
@@ -158,20 +159,60 @@ def _text(dataset: DatasetConfig, tally: _Tally, statistics: Sequence[str], comm
     return "\n".join(lines) + "\n"
 
 
-def _sources(tally: _Tally) -> Iterable[str]:
+def _sources(tally: _Tally, scene: SceneConfig) -> Iterable[str]:
+    """What was used of each kind: of FSID's own, and of every folder of `scene`, with the licences there."""
     names = {"mesh": "meshes", "material": "materials", "sky": "skies"}
+    skies = (scene.hdri_folder,) if scene.hdri_folder else ()
+    folders = {"mesh": scene.mesh_folders, "material": scene.texture_folders, "sky": skies}
     for what, name in names.items():
         used = tally.counts.get(what, Counter())
         own = Counter({key: n for key, n in used.items() if not key.startswith(PREFIX)})
         if own:
             yield f"- FSID's own {name} (Apache-2.0, made by formula): {_listed(own, 'uses')}."
-        for folder, n in sorted(_summed(used - own, _folder).items()):
-            place = " ".join(folder.replace("`", "'").split())
-            yield f"- {name} from `{place}`: {counted(n, 'use')}. {_licence(what, Path(folder), used)}"
+        for folder, (known, theirs) in sorted(_by_folder(used - own, folders[what]).items()):
+            place, uses = " ".join(folder.replace("`", "'").split()), counted(theirs.total(), "use")
+            surveyed = known and what == "mesh"
+            stated = _surveyed_licences(folder, scene.mesh_folders_cc0_only) if surveyed else {}
+            licences = {n: stated[n] if n in stated else _nearest_licence(n, Path(folder)) for n in theirs}
+            yield f"- {name} from `{place}`: {uses}. {_said(theirs, licences)}"
     pictures = tally.counts.get("picture", Counter())
     if pictures:
         number = counted(len(pictures), "picture")
         yield f"- {number} that the maker of this dataset supplied, under their own licences."
+
+
+def _by_folder(used: Counter[str], folders: Sequence[str]) -> dict[str, tuple[bool, Counter[str]]]:
+    """The counts by the innermost of `folders` that a file lies in (True), or by its own, as of a folder that
+    has moved since (False)."""
+    found: dict[str, tuple[bool, Counter[str]]] = {}
+    for name, count in used.items():
+        path, member = split_source(name)
+        around = [folder for folder in folders if path.is_relative_to(folder)]
+        own = str(path if member else path.parent)
+        folder = max(around, key=lambda folder: len(Path(folder).parts), default=own)
+        found.setdefault(folder, (bool(around), Counter()))[1][name] += count
+    return found
+
+
+def _surveyed_licences(folder: str, cc0_only: bool) -> dict[str, str]:
+    """By name, of all usable meshes; the survey is the one that the scenes were drawn from."""
+    return {source.name: source.licence for source in survey_meshes(folder, cc0_only).usable}
+
+
+def _nearest_licence(name: str, root: Path) -> str:
+    path, _ = split_source(name)
+    place = path if path.is_dir() else path.parent
+    return licence_beside(place, root) if place.is_dir() else ""
+
+
+def _said(used: Counter[str], licences: Mapping[str, str]) -> str:
+    """The licences by use, and of how many uses none is known."""
+    stated = _summed(Counter({n: c for n, c in used.items() if licences[n]}), lambda name: licences[name])
+    unknown = used.total() - stated.total()
+    if not stated:
+        return f"No licence file was found with them: {_LOOK}"
+    rest = f" With {unknown} of them no licence file was found: {_LOOK}" if unknown else ""
+    return f"Licences: {_listed(stated, 'uses')}.{rest}"
 
 
 def _statistics(out: Path) -> Iterable[str]:
@@ -193,35 +234,6 @@ def _summed(counts: Counter[str], group: Callable[[str], str]) -> Counter[str]:
     for name, count in counts.items():
         summed[group(name)] += count
     return summed
-
-
-def _folder(source: str) -> str:
-    """The folder or library of a "file:PATH" or "file:PATH!MEMBER"."""
-    path, member = split_source(source)
-    return str(path if member else path.parent)
-
-
-def _licence(what: str, place: Path, used: Counter[str]) -> str:
-    """The licences of the meshes that were used, by their library or nearest file; else the folder's."""
-    if what == "mesh" and place.exists():
-        licences = {source.name: source.licence for source in survey_meshes(str(place)).usable}
-        stated = Counter({name: n for name, n in used.items() if licences.get(name)})
-        by_licence = _summed(stated, lambda name: licences[name])
-        if by_licence:
-            return f"Licences: {_listed(by_licence, 'uses')}."
-    return _folder_licence(place)
-
-
-def _folder_licence(folder: Path) -> str:
-    """What a folder says of its licence: the first line of a licence file in it or above it."""
-    for place in (folder, folder.parent):
-        if place.is_dir():
-            for file in sorted(place.iterdir()):
-                if file.is_file() and file.stem.lower() in ("license", "licence", "copying"):
-                    with file.open(encoding="utf-8", errors="replace") as text:
-                        first = text.read(_LICENCE_LETTERS).strip().partition("\n")[0]
-                    return f"`{file.name}`: {_plain(first[:200])}"
-    return "No licence file was found with them: look at their source before you publish."
 
 
 def _listed(counts: Counter[str], unit: str) -> str:

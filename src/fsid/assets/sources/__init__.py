@@ -2,10 +2,11 @@
 
 from fsid.assets.sources.library import (
     MeshSource,
+    licence_beside,
     load_source,
     mesh_sources,
     split_source,
     survey_meshes,
 )
 
-__all__ = ["MeshSource", "load_source", "mesh_sources", "split_source", "survey_meshes"]
+__all__ = ["MeshSource", "licence_beside", "load_source", "mesh_sources", "split_source", "survey_meshes"]

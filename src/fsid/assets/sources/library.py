@@ -154,7 +154,7 @@ def _candidates(path: Path) -> tuple[list[tuple[str, str]], list[Skipped]]:
     skipped: list[Skipped] = []
     for file in _files(path):
         if file.suffix.lower() != LIBRARY_SUFFIX:
-            found.append((f"{PREFIX}{file}", _licence_beside(file.parent, path)))
+            found.append((f"{PREFIX}{file}", licence_beside(file.parent, path)))
             continue
         try:
             found += [(f"{PREFIX}{file}!{e.member}", e.licence) for e in _catalogue(file)]
@@ -176,8 +176,8 @@ def _files(path: Path) -> Iterator[Path]:
 
 
 @lru_cache(maxsize=4096)
-def _licence_beside(folder: Path, root: Path) -> str:
-    """What the nearest licence file from `folder` up to `root` says: "CC0", or its first line."""
+def licence_beside(folder: Path, root: Path) -> str:
+    """What the nearest licence file from `folder` up to `root` says: "CC0" or its first line, "" for none."""
     for name in sorted(os.listdir(folder)):
         if _LICENCE_FILES.fullmatch(name) and (folder / name).is_file():
             try:
@@ -188,7 +188,7 @@ def _licence_beside(folder: Path, root: Path) -> str:
             first = next((line.strip() for line in text.splitlines() if line.strip()), "")
             return "CC0" if _is_cc0(text) else first[:200]
     inside = folder != root and root in folder.parents
-    return _licence_beside(folder.parent, root) if inside else ""
+    return licence_beside(folder.parent, root) if inside else ""
 
 
 def _is_cc0(text: str) -> bool:
