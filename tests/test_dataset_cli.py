@@ -20,10 +20,11 @@ from fsid.cli.libraries import read_libraries
 from fsid.cli.main import main
 from fsid.cli.progress import progress_bar
 from fsid.dataset import Workforce, contact_sheet, generate_config, make_only, shard_path, write_shard
+from fsid.dataset.estimate import pairs_of_busiest
 from fsid.dataset.index import index_mosaics
 from fsid.dataset.png import to_uint8
 from fsid.dataset.sample import make_sample
-from fsid.dataset.shards import read_samples
+from fsid.dataset.shards import read_member, read_samples
 from fsid.errors import FsidError
 from fsid.scene import SceneConfig
 from fsid.sensor import develop
@@ -107,12 +108,14 @@ def test_the_settings_of_a_dataset_make_it_grow_and_make_another(data: Path, tmp
     )
 
 
-@pytest.mark.parametrize("option", [["--seed", "5"], ["--width", "64"]])
+@pytest.mark.parametrize(
+    ("option", "words"), [(["--seed", "5"], "another seed"), (["--width", "64"], "width (32 there, 64 here)")]
+)
 def test_only_makes_nothing_of_another_dataset(
-    data: Path, option: list[str], refused: Callable[..., str]
+    data: Path, option: list[str], words: str, refused: Callable[..., str]
 ) -> None:
     before = sorted(data.rglob("*"))
-    assert "another seed" in refused("generate", data / "data", "--only", "2", *option)
+    assert words in refused("generate", data / "data", "--only", "2", *option)
     assert sorted(data.rglob("*")) == before
 
 
@@ -368,3 +371,48 @@ def test_a_place_that_takes_no_picture_is_said_before_scenes_are_rendered(
     assert "it is no file" in refused("preview", tmp_path / "folder.png", "--quiet")
     monkeypatch.setattr("fsid.files.os.access", lambda *_: False)
     assert "no folder that you may write to" in refused("preview", tmp_path / "new.png", "--quiet")
+
+
+def test_pictures_that_a_larger_count_adds_are_decoded_before_anything_is_written(
+    photos: Path, tmp_path: Path, refused
+) -> None:
+    album, out = shutil.copytree(photos, tmp_path / "album"), tmp_path / "out"
+    for name in ("coffee-1.png", "coffee-2.png"):
+        (album / name).write_bytes((album / name).read_bytes()[:2000])
+    command = ["generate", str(out), "--images", str(album), "--width", "64", "--height", "48", "--quiet"]
+    main([*command, "--count", "1"])
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+    told = refused(*command, "--count", "3")
+    assert "coffee-1.png" in told
+    assert "coffee-2.png" in told
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+    main([*command, "--count", "1"])
+
+
+def test_one_sample_of_a_dataset_whose_pictures_have_moved(photos: Path, tmp_path: Path, refused) -> None:
+    album, moved, out = shutil.copytree(photos, tmp_path / "album"), tmp_path / "moved", tmp_path / "out"
+    command = ["generate", str(out), "--width", "64", "--height", "48", "--quiet", "--images"]
+    main([*command, str(album), "--count", "1"])
+    stored = read_member(shard_path(out, 0), "00000000.noisy.dng")
+    album.rename(moved)
+    for key in ("00000000", "00000002"):  # in a shard, and not yet
+        assert "album" in refused(*command[:2], "--only", key)
+        main([*command, str(moved), "--only", key])
+    assert (out / "00000000.noisy.dng").read_bytes() == stored
+    wider = [*command[:2], "--images", moved, "--width", "80", "--only", "00000000"]
+    assert "width (64 there, 80 here)" in refused(*wider)
+
+
+@pytest.mark.parametrize(
+    ("count", "shards", "workers", "busiest"),
+    [
+        (17, 2, 2, 16),
+        (48, 3, 2, 32),
+        (1040, 65, 64, 32),
+        (5, 5, 2, 3),
+        (175_000, 10_938, 4, 43_760),
+        (7, 1, 1, 7),
+    ],
+)
+def test_the_busiest_worker_makes_whole_shards(count: int, shards: int, workers: int, busiest: int) -> None:
+    assert pairs_of_busiest(count, shards, workers, 16) == busiest

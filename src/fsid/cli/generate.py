@@ -96,6 +96,7 @@ def generate(
         generate_config,
         is_begun,
         make_only,
+        pairs_there,
     )
 
     given = overrides(
@@ -134,26 +135,30 @@ def generate(
         plan = _plan(out, settings, dataset, count, workforce, quiet=quiet)
         Terminal(markup=False).print(plan, soft_wrap=True)
     else:
-        if not is_begun(out, dataset):
-            _check_sources(settings, count, workforce, quiet=quiet)
+        there = pairs_there(out, dataset.shard_size) if is_begun(out, dataset) else 0
+        if there < count:
+            _check_sources(settings, range(there, count), workforce, quiet=quiet)
         made = _make(out, settings, count, seed, workforce, quiet=quiet)
         console.print(f"{out}: {counted(count, 'pair')}, {made} of them new", soft_wrap=True, markup=False)
 
 
-def _check_sources(settings: GenerateConfig, count: int, workforce: Workforce, *, quiet: bool) -> None:
-    """Before anything is written: the pictures of all frames, decoded on as many cores as there are workers,
-    or the panoramas and the GPUs of these."""
+def _check_sources(settings: GenerateConfig, pairs: range, workforce: Workforce, *, quiet: bool) -> None:
+    """Before anything is written: the pictures of the frames of `pairs`, decoded on as many cores as there
+    are workers, or the panoramas and the GPUs of these."""
     from fsid.dataset import check_pictures, find_pictures
     from fsid.render import check_skies, gpu_device
 
     skies = settings.scene.panoramas
-    if skies and not settings.images:
+    if skies and not settings.images and not pairs.start:
         with progress_bar(f"checking {skies}", "panoramas", quiet=quiet) as progress:
             check_skies(skies, progress)
     if settings.images:
-        pictures = find_pictures(Path(settings.images))[: -(-count // settings.pairs_per_frame)]
-        with progress_bar(f"checking {settings.images}", "pictures", quiet=quiet) as progress:
-            check_pictures(pictures, min(workforce.workers, os.cpu_count() or 1), progress)
+        per_frame = settings.pairs_per_frame
+        frames = slice(pairs.start // per_frame, -(-pairs.stop // per_frame))
+        pictures = find_pictures(Path(settings.images))[frames]
+        if pictures:
+            with progress_bar(f"checking {settings.images}", "pictures", quiet=quiet) as progress:
+                check_pictures(pictures, min(workforce.workers, os.cpu_count() or 1), progress)
     elif workforce.workers_per_gpu and not workforce.ray and settings.renderer == "raster":
         gpu_device((workforce.workers - 1) // workforce.workers_per_gpu)
 

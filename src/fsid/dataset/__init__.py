@@ -4,7 +4,7 @@ from fsid.dataset.attempt import Sample, sample_key
 from fsid.dataset.config import RENDERED, DatasetConfig, GenerateConfig, generate_config
 from fsid.dataset.contact_sheet import contact_sheet, grid
 from fsid.dataset.estimate import Estimate, estimate
-from fsid.dataset.generate import Workforce, generate, pairs_to_make
+from fsid.dataset.generate import Workforce, generate, pairs_there, pairs_to_make
 from fsid.dataset.identity import check_settings, dataset_config, is_begun
 from fsid.dataset.photos import find_photos, read_photo
 from fsid.dataset.pictures import check_pictures, find_pictures
@@ -40,6 +40,7 @@ __all__ = [
     "make_frame",
     "make_only",
     "make_sample",
+    "pairs_there",
     "pairs_to_make",
     "read_member",
     "read_photo",

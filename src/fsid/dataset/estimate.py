@@ -1,6 +1,6 @@
 """What a dataset will cost, from a short sample that is measured on the spot.
 
-    time = pairs left * seconds of a frame / pairs per frame / workers        seconds: all workers at once
+    time = pairs of the busiest worker * seconds of a frame / pairs per frame    seconds: all workers at once
 
 Every worker makes a frame to warm up (programs compiled, first materials baked) and then `FRAMES` frames that
 count, while the others do the same, so what they take from each other is in the figure.
@@ -75,7 +75,13 @@ def estimate(
         pairs=count,
         shards=shards,
         workers=workers,
-        seconds=count * seconds_per_pair / workers,
+        seconds=seconds_per_pair * pairs_of_busiest(count, shards, workers, dataset.shard_size),
         bytes=round(count * sum(size for _, size, _ in results) / pairs),
         measured_pairs=pairs,
     )
+
+
+def pairs_of_busiest(count: int, shards: int, workers: int, shard_size: int) -> int:
+    """How many of `count` pairs the worker makes that makes most, at most: shards are made whole."""
+    most = -(-shards // workers)
+    return min(most * shard_size, count - (shards - most))

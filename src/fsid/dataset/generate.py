@@ -177,6 +177,12 @@ def pairs_to_make(
     return sum(len(shard.indices) for shard in missing), len(missing)
 
 
+def pairs_there(out: str | Path, shard_size: int) -> int:
+    """How many pairs `out` has, whole shards and those of the last one."""
+    shards = sorted(Path(out).glob("shard-*.tar"))
+    return (len(shards) - 1) * shard_size + count_whole(shards[-1]) if shards else 0
+
+
 @contextmanager
 def _locked(out: Path) -> Iterator[None]:
     """`out` is this process's, and free of what an interrupted one left, if that is sure to be dead."""

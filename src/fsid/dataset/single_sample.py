@@ -9,7 +9,7 @@ from typing import Any
 from fsid.config import from_plain
 from fsid.dataset.attempt import SAMPLE_KEY, Sample, sample_key
 from fsid.dataset.config import DATASET_FILE, DatasetConfig, GenerateConfig
-from fsid.dataset.identity import check_same_origins, dataset_config
+from fsid.dataset.identity import check_same_origins, dataset_config, is_begun
 from fsid.dataset.sample import encode, make_sample, remake
 from fsid.dataset.shards import read_record, read_records, shard_path
 from fsid.dataset.worker import rendering
@@ -54,10 +54,14 @@ def _from_key(
     index, file = int(key), out / DATASET_FILE
     if file.exists():
         dataset = from_plain(DatasetConfig, read_yaml(file), source=str(file))
-        if config not in (None, dataset.generate) or seed not in (None, dataset.seed):
-            raise FsidError(f"{out}: holds a dataset of other settings or another seed; leave them out")
-        check_same_origins(out, dataset)
-        config, seed = dataset.generate, dataset.seed
+        if seed not in (None, dataset.seed):
+            raise FsidError(f"{out}: holds a dataset of another seed; leave it out")
+        if config not in (None, dataset.generate):  # folders that have moved since, or a refusal
+            is_begun(out, dataset_config(config, dataset.seed, dataset.shard_size))
+        else:
+            check_same_origins(out, dataset)
+            config = dataset.generate
+        seed = dataset.seed
         shard = shard_path(out, index // dataset.shard_size)
         records = read_records(shard) if shard.exists() else iter(())
         try:
@@ -67,6 +71,9 @@ def _from_key(
                 f"{shard}: a sample's JSON states no index; delete it and generate again"
             ) from None
         if found is not None:
+            settings = found.get("settings")
+            if config.images and isinstance(settings, dict):
+                found = found | {"settings": settings | {"images": config.images}}
             return _remake(found, f"{shard}: sample {index}")
         if any(out.glob("shard-*.tar")):
             note(f"no shard of {out} has sample {sample_key(index)} yet; this is what it would be")
