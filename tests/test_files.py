@@ -1,11 +1,12 @@
 """A file appears whole or not at all, and nothing lies beside it afterwards."""
 
 import errno
+import fcntl
 import os
 import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from fsid.dataset.pictures import read_exr
 from fsid.dataset.shards import part_path, write_shard
 from fsid.errors import FsidError
 from fsid.evaluate.testset import TESTSET_FILE, read_testset
-from fsid.files import check_folder, make_folder, write_atomically, write_together
+from fsid.files import check_folder, held, make_folder, write_atomically, write_together
 from fsid.sensor import load_profile
 from fsid.yaml_json import read_json, read_yaml
 
@@ -202,3 +203,27 @@ def test_no_reader_waits_for_what_has_no_end(
         return
     with pytest.raises(FsidError, match=name):
         read(tmp_path / name)
+
+
+def test_a_folder_that_knows_no_locks_is_held_by_a_file_in_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """NFS: only what is open for writing can be locked."""
+    lock = fcntl.flock
+
+    def of_nfs(file: Any, operation: int) -> None:
+        descriptor = file if isinstance(file, int) else file.fileno()
+        if fcntl.fcntl(descriptor, fcntl.F_GETFL) & os.O_ACCMODE == os.O_RDONLY:
+            raise OSError(errno.EBADF, os.strerror(errno.EBADF))
+        lock(descriptor, operation)
+
+    monkeypatch.setattr(fcntl, "flock", of_nfs)
+    with held(tmp_path, "another is at work") as alone:
+        assert alone
+        with pytest.raises(FsidError, match="another is at work"), held(tmp_path, "another is at work"):
+            pass
+    with held(tmp_path, "another is at work") as alone:
+        assert alone
+    monkeypatch.setattr(fcntl, "flock", lambda *_: (_ for _ in ()).throw(OSError(errno.ENOLCK, "no locks")))
+    with held(tmp_path, "another is at work") as alone:
+        assert not alone

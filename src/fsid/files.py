@@ -44,6 +44,22 @@ def read_whole(path: Path, most_bytes: int = MOST_BYTES) -> bytes:
     return data
 
 
+def same_files(some: Iterable[Path], others: Iterable[Path]) -> bool:
+    """Whether a file of `some` is one of `others`, by another spelling where names ignore case, too."""
+    return not _identities(some).isdisjoint(_identities(others))
+
+
+def _identities(paths: Iterable[Path]) -> set[object]:
+    """Where each path leads and, of a file that is there, which file that is."""
+    found: set[object] = set()
+    for path in paths:
+        found.add(path.resolve())
+        with contextlib.suppress(OSError):
+            there = path.stat()
+            found.add((there.st_dev, there.st_ino))
+    return found
+
+
 def check_file(path: Path) -> None:
     """FsidError where `path` is there and no file: a pipe may stay silent, and a device has no end."""
     if path.exists() and not path.is_file():
@@ -79,6 +95,8 @@ def write_together(files: Mapping[Path, bytes]) -> None:
                 raise FsidError(f"{path}: cannot be written (it is no file); give another name")
             with open_new(parts[path]) as file:
                 file.write(data)
+                file.flush()
+                os.fsync(file.fileno())  # else a power cut may leave an empty file under the name
         for path, part in parts.items():
             os.replace(part, path)
     except OSError as error:
@@ -147,6 +165,24 @@ def held(folder: Path, taken: str) -> Iterator[bool]:
             raise FsidError(f"{folder}: {taken}; wait for it or stop it") from None
         except OSError:
             alone = False
-        yield alone
+        if alone:
+            yield alone
+        else:
+            with _held_by_file(folder, taken) as alone:
+                yield alone
     finally:
         os.close(descriptor)
+
+
+@contextlib.contextmanager
+def _held_by_file(folder: Path, taken: str) -> Iterator[bool]:
+    """As `held`, by a hidden file in `folder`: NFS locks only what is open for writing, as no folder is."""
+    with (folder / ".fsid.lock").open("ab") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            alone = True
+        except BlockingIOError:
+            raise FsidError(f"{folder}: {taken}; wait for it or stop it") from None
+        except OSError:
+            alone = False
+        yield alone

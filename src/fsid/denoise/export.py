@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 import torch
@@ -20,7 +20,7 @@ from fsid.denoise.onnx_int8 import eight_bit
 from fsid.denoise.probes import Probe, mean_psnr, probes
 from fsid.denoise.sessions import read_sessions
 from fsid.errors import FsidError
-from fsid.files import check_output, write_atomically
+from fsid.files import check_output, same_files, write_atomically
 from fsid.sensor import NoiseLevel
 from fsid.yaml_json import read_json
 
@@ -55,9 +55,11 @@ def export(run: str | Path | None, file: str | Path, precision: Precision | None
     suffix = file.suffix.lower()
     if suffix not in (".onnx", ".safetensors"):
         raise FsidError(f"{file}: a network is exported as .onnx or .safetensors")
+    if precision not in (None, *get_args(Precision)):
+        raise FsidError(f"precision {precision}: choose {', '.join(get_args(Precision))}")
     if suffix == ".safetensors" and precision == "int8":
         raise FsidError("int8: is for .onnx; .safetensors holds float32 or float16")
-    if file.resolve() == path.resolve():
+    if same_files([file], [path]):
         raise FsidError(f"{file}: is the network itself, which would be overwritten; give another name")
     check_output(file)
     denoiser = load_denoiser(path)

@@ -14,7 +14,7 @@ from pathlib import Path
 from fsid.denoise.denoise import Network, check_strength, denoise_raw
 from fsid.denoise.preview import preview_of
 from fsid.errors import FsidError
-from fsid.files import check_output, make_folder, paths_of
+from fsid.files import check_output, make_folder, paths_of, same_files
 from fsid.sensor import (
     Layout,
     NoiseLevel,
@@ -170,7 +170,7 @@ def denoise_file(
     source, target = Path(source), Path(target)
     if target.suffix.lower() != ".dng":
         raise FsidError(f"{target}: a denoised RAW is written as .dng")
-    if target.resolve() == source.resolve():
+    if same_files([target], [source]):
         raise FsidError(f"{target}: is the original, which would be overwritten; give another name")
     check_output(target)
     raw = read_input(source, layout)
@@ -182,10 +182,10 @@ def denoise_file(
     noise = noise_of(raw, profile, iso, source)
     if iso is not None and not raw.iso > 0:
         raw = replace(raw, iso=iso)
-    if mend_hot_pixels:
-        raw, hot = without_hot_pixels(raw, noise.level)
-        noise = replace(noise, hot=hot)
     try:
+        if mend_hot_pixels:
+            raw, hot = without_hot_pixels(raw, noise.level)
+            noise = replace(noise, hot=hot)
         clean = denoise_raw(raw, model, noise.level, strength=strength, ensemble=ensemble, progress=progress)
     except FsidError as error:
         raise FsidError(f"{source}: {error}") from None
@@ -228,7 +228,7 @@ def denoise_folder(
     if twice := sorted({name for name in names if names.count(name) > 1}):
         raise FsidError(f"{paths[0].parent}: several files would become {twice[0]}.dng; rename one")
     targets = [target_in(target, path) for path in paths]
-    if {path.resolve() for path in targets} & {path.resolve() for path in paths}:
+    if same_files(targets, paths):
         raise FsidError(f"{target}: is the folder of the originals, which would be overwritten")
     if skip_existing:
         left = [pair for pair in zip(paths, targets, strict=True) if not pair[1].is_file()]

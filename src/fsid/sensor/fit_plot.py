@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 
 from fsid.errors import FsidError
 from fsid.evenly_spaced import spaced
-from fsid.files import check_output
+from fsid.files import check_output, same_files
 from fsid.sensor.calibrate import LINEAR_SHARE, NoiseFit
 from fsid.sensor.camera_fit import Calibration
 from fsid.sensor.camera_profile import MONO, CameraProfile
@@ -34,7 +34,7 @@ def check_picture(path: Path, beside: Path | None = None) -> None:
 
     beside: another file that is written, too.
     """
-    if beside is not None and path.resolve() == beside.resolve():
+    if beside is not None and same_files([path], [beside]):
         raise FsidError(f"{path}: would be both profile and plot; give two names")
     if path.suffix.lower() not in PICTURES:
         raise FsidError(f"{path}: a plot is written as {', '.join(PICTURES)}")
@@ -51,9 +51,8 @@ def check_profile(path: Path, frames: Collection[Path], plot: Path | None) -> No
     check_output(path)
     if plot is not None:
         check_picture(plot, path)
-    taken = {frame.resolve() for frame in frames}
     for written in (path, plot):
-        if written is not None and written.resolve() in taken:
+        if written is not None and same_files([written], frames):
             raise FsidError(f"{written}: is one of the frames; write to another file")
 
 
