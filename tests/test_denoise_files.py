@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import inspect
+import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -24,8 +26,9 @@ from fsid.denoise import ModelCard, NetworkConfig, RawDenoiser, denoise_raw, loa
 from fsid.denoise import model as model_module  # noqa: E402
 from fsid.denoise.denoise import variance_at_grey  # noqa: E402
 from fsid.denoise.export import export  # noqa: E402
-from fsid.denoise.files import denoise_file, noise_of  # noqa: E402
+from fsid.denoise.files import denoise_file, denoise_folder, noise_of  # noqa: E402
 from fsid.denoise.interface import denoise  # noqa: E402
+from fsid.denoise.model import model_path  # noqa: E402
 from fsid.denoise.preview import PREVIEW_PX, preview_of  # noqa: E402
 from fsid.errors import FsidError  # noqa: E402
 from fsid.sensor import (  # noqa: E402
@@ -465,6 +468,46 @@ def test_an_original_is_not_overwritten(noisy_file: Path, network: Path, refused
     for same in (noisy_file, noisy_file.parent / "sub" / ".." / noisy_file.name):
         assert "original" in refused("denoise", noisy_file, same, "--model", network, "--quiet")
     assert noisy_file.read_bytes() == before
+
+
+def test_an_original_is_not_overwritten_where_names_ignore_case(
+    noisy_file: Path, network: Path, refused: Callable[..., str]
+) -> None:
+    """As on memory cards and macOS, where L1.DNG becomes L1.dng: here a second name of one file."""
+    folder = noisy_file.parent / "card"
+    folder.mkdir()
+    original = noisy_file.rename(folder / "L1.DNG")
+    os.link(original, folder / "L1.dng")
+    before = original.read_bytes()
+    told = refused("denoise", original, folder / "L1.dng", "--model", network, "--quiet")
+    assert "original" in told
+    with pytest.raises(FsidError, match="is the folder of the originals"):
+        denoise_folder([original], folder, load_model(network))
+    assert original.samefile(folder / "L1.dng")
+    assert original.read_bytes() == before
+
+
+def test_a_run_given_by_its_whole_path_is_not_the_file_beside_it(network: Path, tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    run.mkdir()
+    shutil.copy(network, run / "model.safetensors")
+    (tmp_path / "run.safetensors").write_bytes(b"an older export")
+    assert model_path(run) == run / "model.safetensors"
+    assert model_path("nafnet-small") != model_path(tmp_path / "nafnet-small")
+
+
+@pytest.mark.parametrize("name", ["a.onnx", "a.safetensors"])
+def test_an_unknown_precision_is_refused(network: Path, tmp_path: Path, name: str) -> None:
+    with pytest.raises(FsidError, match="precision half: choose float32, float16, int8"):
+        export(network, tmp_path / name, "half")  # type: ignore[arg-type]
+    assert not (tmp_path / name).exists()
+
+
+def test_what_is_wrong_with_one_file_names_it(noisy_file: Path, network: Path) -> None:
+    raw = replace(noisy_raw(), noise=NoiseLevel((2.0,) * 4, (0.0,) * 4))
+    write_dng(noisy_file, raw)
+    with pytest.raises(FsidError, match=r"noisy\.dng: "):
+        denoise_file(noisy_file, noisy_file.parent / "out.dng", load_model(network), mend_hot_pixels=True)
 
 
 def test_a_folder_that_is_not_there_is_said_before_the_work(noisy_file: Path, network: Path) -> None:

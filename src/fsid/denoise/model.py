@@ -124,7 +124,8 @@ def model_path(run_or_file: str | Path | None) -> Path:
     """The file of a network: of a run folder, a shipped one by its name, a file; None is `DEFAULT_MODEL`."""
     name = str(run_or_file or DEFAULT_MODEL)
     shipped = WEIGHTS / f"{name}.safetensors"
-    if os.path.isfile(shipped):  # unlike Path.is_file, False for a name that is too long, too
+    is_name = os.path.basename(name) == name  # of a whole path pathlib would take the file beside a run
+    if is_name and os.path.isfile(shipped):  # unlike Path.is_file, False for a name that is too long, too
         return shipped
     if run_or_file is None:
         raise FsidError("no network ships with this version of FSID; give one with --model RUN or FILE")
