@@ -66,6 +66,7 @@ def _npy(array, cut=0):
         ("a.npy", lambda p: p.write_bytes(b"text"), {}, "no array of numbers"),
         ("a.png", lambda p: p.write_bytes(b"text"), {}, r"a\.png"),
         ("a.png", lambda p: Image.new("RGB", (4, 4)).save(p), {}, r"\(4, 4, 3\)"),
+        ("a.png", lambda p: Image.new("L", (4, 4), 9).quantize(4).save(p), {}, "palette"),
         ("a.tif", lambda p: p.write_bytes(b"text"), {}, r"a\.tif"),
         ("a.txt", lambda p: p.write_bytes(b"text"), {}, "unknown kind"),
         ("a.raw", lambda p: None, {"width": 8, "height": 6}, "no such"),

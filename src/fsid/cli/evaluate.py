@@ -13,6 +13,7 @@ from fsid.cli.iso_notes import note_files
 from fsid.cli.notes import note
 from fsid.cli.progress import progress_bar
 from fsid.cli.tables import print_table
+from fsid.errors import FsidError
 from fsid.files import check_folder
 
 
@@ -41,6 +42,8 @@ def evaluate(
     from fsid.evaluate.models import evaluate_models, write_comparison
     from fsid.sensor import profile_names
 
+    if ensemble > 1 and not model:
+        raise FsidError(f"--ensemble {ensemble}: is for networks; name one with --model")
     if output is not None:
         check_folder(output)
     notes: list[str] = []

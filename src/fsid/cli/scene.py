@@ -22,7 +22,7 @@ def scene(
     width: int | None = None,
     height: int | None = None,
     variant: Variant | None = None,
-    texture_size: int = 512,
+    texture_size: int | None = None,
 ) -> None:
     """Write the scene of a seed: .json for FSID, .glb (glTF 2.0) for Blender and any other engine.
 
@@ -34,7 +34,7 @@ def scene(
         width: Width of the camera's image in pixels (default 1920).
         height: Height of the camera's image in pixels (default 1080).
         variant: What varies between scenes (default full).
-        texture_size: Pixels per side of a texture tile in a .glb, a power of two.
+        texture_size: Pixels per side of a texture tile in a .glb, a power of two (default 512).
     """
     from fsid.config import given_keys
     from fsid.dataset import check_given, generate_config
@@ -45,6 +45,8 @@ def scene(
     suffix = output.suffix.lower()
     if suffix not in (".json", ".glb"):
         raise FsidError(f"{output}: scenes are written as .json or .glb")
+    if texture_size is not None and suffix != ".glb":
+        raise FsidError(f"--texture-size: {output} holds no textures; it is for a .glb")
     given = overrides(set, width=width, height=height, variant=variant)
     settings = generate_config(config, given)
     check_given(settings, given_keys(given), "scene")
@@ -56,6 +58,6 @@ def scene(
         variant=settings.variant,
     )
     if suffix == ".glb":
-        write_glb(output, chosen, texture_size=texture_size)
+        write_glb(output, chosen, texture_size=512 if texture_size is None else texture_size)
     else:
         write_atomically(output, scene_to_json(chosen).encode())

@@ -246,6 +246,8 @@ def _read(path: Path, cfa: str | None, width: int | None, height: int | None) ->
 def _read_png(path: Path) -> np.ndarray:
     with Image.open(path, formats=("PNG",)) as image:
         _check_size((image.height, image.width))
+        if image.mode == "P":
+            raise ValueError("it holds numbers of colours (a palette), not values; write it as greys")
         return np.asarray(image)
 
 

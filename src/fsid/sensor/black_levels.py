@@ -33,6 +33,8 @@ class BlackLevels:
         if each.shape not in ((1,), (4,)) or (len(each) == 4 and cfa is None):
             sites = "one, or one each of R, Gr, Gb and B" if cfa else "one"
             raise FsidError(f"{where}: {len(each)} black levels; {sites} is possible")
+        if not np.isfinite(each).all():
+            raise FsidError(f"{where}: must be numbers")
         tile = np.full((2, 2), each[0])
         for place, level in zip(site_offsets(cfa) if cfa else (), np.broadcast_to(each, 4), strict=False):
             tile[place] = level

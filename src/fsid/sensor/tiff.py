@@ -140,7 +140,7 @@ def _values(tag: Tag) -> tuple[bytes, int]:
 
 
 def rationals(values: Iterable[float]) -> tuple[int, ...]:
-    """Numerators and denominators in turn; numbers return within 1e-11 of themselves."""
+    """Numerators and denominators in turn; numbers return within 5e-7 of themselves."""
     fractions = [Fraction(float(value)).limit_denominator(_DENOMINATOR) for value in values]
     return tuple(n for f in fractions for n in (f.numerator, f.denominator))
 
@@ -169,13 +169,13 @@ def read_directories(file: BinaryIO) -> list[dict[int, Tag]]:
     size = file.seek(0, 2)
     first = _read_directory(file, order, struct.unpack(order + "I", header[4:])[0], size)
     children = [offset for code in (EXIF_IFD, SUB_IFD) if code in first for offset in first[code].values]
-    return [first, *(_read_directory(file, order, int(o), size) for o in children[:_MAX_CHILDREN])]
+    return [first, *(_read_directory(file, order, o, size) for o in children[:_MAX_CHILDREN])]
 
 
-def _read_directory(file: BinaryIO, order: str, offset: int, size: int) -> dict[int, Tag]:
-    if offset + 2 > size:
+def _read_directory(file: BinaryIO, order: str, offset: float, size: int) -> dict[int, Tag]:
+    if not 0 <= offset <= size - 2:  # nor NaN
         return {}
-    file.seek(offset)
+    file.seek(int(offset))
     (count,) = struct.unpack(order + "H", file.read(2))
     entries = file.read(12 * min(count, _MAX_ENTRIES))
     tags: dict[int, Tag] = {}
