@@ -240,6 +240,24 @@ def test_no_area_light_turns_its_back_to_the_camera_in_view():
     assert areas > 30
 
 
+def test_every_area_light_hangs_in_its_room_and_shines_at_the_focus():
+    """Large ones had no place in small rooms, and lay below the floor, turned away."""
+    lights = LightConfig(kind_shares=(0.0, 0.0, 1.0), count=(2, 2), area_m=(1.0, 3.0), distance_m=(2.0, 5.0))
+    small = BackgroundConfig(kind_shares=(1, 0, 0, 0), width_m=(2.0, 2.0), height_m=(6.0, 6.0))
+    areas = 0
+    for seed in range(60):
+        s = scene(seed, background=small, lights=lights)
+        half = np.array(s.background.size_m[:2]) / 2
+        for light in s.lights:
+            if light.kind == "area":
+                areas += 1
+                assert np.all(np.abs(light.position_m[:2]) < half)
+                assert 0 < light.position_m[2] < s.background.size_m[2]
+                to_focus = np.subtract((0.0, 0.0, 0.35), light.position_m)
+                assert to_focus @ light.direction > 0
+    assert areas > 30
+
+
 def test_the_sun_is_redder_the_lower_it_stands():
     suns = [
         _daylight_rand(np.random.default_rng(i), LightConfig(sun_share=1.0), 5.0, "procedural")[0]

@@ -201,7 +201,7 @@ def test_every_drawn_distortion_can_be_inverted(seed, fov_deg, fisheye):
     """Newton's method finds the undistorted point of the corner and of every radius before it."""
     config = LensConfig(distortion_share=1.0, fisheye_share=float(fisheye), distortion=(-0.5, 0.5))
     camera = dataclasses.replace(CAMERA, fov_deg=fov_deg)
-    camera = lens_rand(np.random.default_rng(seed), config, camera)
+    camera = lens_rand(np.random.default_rng(seed), config, camera, 1.0)
     if camera.distortion is None:
         assert not fisheye
         return
@@ -245,7 +245,7 @@ def lenses(count, camera=CAMERA, **knobs):
     """Lenses of as many seeds with these knobs, all of whose shares are 0 unless given."""
     shares = ("distortion", "fisheye", "blur", "vignetting", "fringe", "soft", "sharp")
     config = LensConfig(**{f"{name}_share": 0.0 for name in shares} | knobs)
-    return [lens_rand(np.random.default_rng(seed), config, camera) for seed in range(count)]
+    return [lens_rand(np.random.default_rng(seed), config, camera, 1.0) for seed in range(count)]
 
 
 @pytest.mark.parametrize("displacement", [-0.08, 0.08])
@@ -339,7 +339,7 @@ def test_views_come_from_all_around_and_look_at_the_focus_and_beside_it():
     config = CameraConfig(skyward_share=0.0, roll_deg=0.0, distance_m=(0.5, 5.0))
     aside, octants = [], []
     for seed in range(400):
-        camera, focus = camera_rand(np.random.default_rng(seed), config, wide, 96, 64)
+        camera, focus, _ = camera_rand(np.random.default_rng(seed), config, wide, 96, 64)
         away = np.subtract(camera.position_m, focus)
         aside.append(np.subtract(camera.target_m, focus) / np.linalg.norm(away))
         octants.append(int(np.arctan2(away[1], away[0]) // (np.pi / 4)))
@@ -371,13 +371,44 @@ def test_every_lens_that_is_drawn_can_be_rendered(width, height, fov_deg, fishey
     camera = dataclasses.replace(CAMERA, width=width, height=height, fov_deg=fov_deg)
     config = LensConfig(distortion_share=1.0, distortion=(-0.5, 0.5), fisheye_share=fisheye_share)
     for seed in range(60):
-        lens_of(lens_rand(np.random.default_rng(seed), config, camera))
+        lens_of(lens_rand(np.random.default_rng(seed), config, camera, 1.0))
 
 
 def test_the_focus_is_a_share_of_the_distance():
     config = LensConfig(blur_share=1.0, focus=(2.0, 2.0))
-    camera = lens_rand(np.random.default_rng(0), config, CAMERA)
-    assert camera.focus_m == pytest.approx(2 * np.hypot(2.0, 0.7))
+    assert lens_rand(np.random.default_rng(0), config, CAMERA, 1.5).focus_m == pytest.approx(3.0)
+
+
+def test_views_up_at_the_sky_are_focused_on_what_is_in_front():
+    """The point that they look at is up in the air, many times as far as the things below it."""
+    for skyward in (0.0, 1.0):
+        knobs = {"lens": LensConfig(blur_share=1.0), "background": BackgroundConfig(kind_shares=(0, 0, 0, 1))}
+        for seed in range(12):
+            config = CameraConfig(skyward_share=skyward, fov_deg=(110.0, 120.0))
+            camera = scene(seed, camera=config, **knobs).cameras[0]
+            to_middle = np.linalg.norm(np.subtract(camera.position_m, (0, 0, 0.35)))
+            assert 0.4 < camera.focus_m / to_middle < 2.1  # 0.7 to 1.4 times, and the focus lies beside it
+
+
+def test_eyes_above_high_hills_keep_their_baseline():
+    background = BackgroundConfig(kind_shares=(0, 0, 0, 1), hills_m=(200, 200), ground_m=(300, 300))
+    highest = 0.0
+    for seed in range(40):
+        far = CameraConfig(distance_m=(60, 100))
+        eyes = scene(seed, camera=far, background=background, rig=RigConfig(eyes=2)).cameras
+        highest = max(highest, eyes[0].position_m[2])
+        assert np.linalg.norm(np.subtract(eyes[0].position_m, eyes[1].position_m)) > 0.02
+    assert highest > 55
+
+
+def test_the_smallest_images_have_lenses_that_can_be_rendered():
+    camera = dataclasses.replace(CAMERA, width=160, height=16, fov_deg=150.0)
+    config = LensConfig(fisheye_share=1.0)
+    drawn = [lens_rand(np.random.default_rng(seed), config, camera, 1.0) for seed in range(20)]
+    for each in drawn:
+        lens_of(each)
+    narrow = dataclasses.replace(camera, fov_deg=90.0)
+    assert lens_rand(np.random.default_rng(0), config, narrow, 1.0).distortion is not None
 
 
 def test_a_camera_rolls_about_its_axis_by_the_configured_angle():

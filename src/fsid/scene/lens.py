@@ -27,8 +27,11 @@ _MIN_SLOPE = 0.1
 _DECENTRING = 0.0005
 
 
-def lens_rand(rng: np.random.Generator, config: LensConfig, camera: Camera) -> Camera:
-    """The camera with a lens of its own; every number is drawn, whatever the shares leave out."""
+def lens_rand(rng: np.random.Generator, config: LensConfig, camera: Camera, depth_m: float) -> Camera:
+    """The camera with a lens of its own; every number is drawn, whatever the shares leave out.
+
+    depth_m: how far away is what it is focused on, give or take.
+    """
     distorted, fisheye, blurred, vignetted, fringed, soft = rng.random(6) < (
         config.distortion_share,
         config.fisheye_share,
@@ -52,8 +55,7 @@ def lens_rand(rng: np.random.Generator, config: LensConfig, camera: Camera) -> C
     elif distorted:
         camera = replace(camera, distortion=_brown_conrady(camera, displacement, second, decentring))
     if blurred:
-        depth = float(np.linalg.norm(np.subtract(camera.target_m, camera.position_m)))
-        camera = replace(camera, aperture_m=aperture_m, focus_m=depth * float(focus))
+        camera = replace(camera, aperture_m=aperture_m, focus_m=depth_m * float(focus))
     if vignetted:
         a1, a2, a3 = (float(-loss * p) for p in power)
         camera = replace(camera, vignetting=(a1, a2, a3))
@@ -125,7 +127,10 @@ def _brown_conrady(
 
 
 def _fisheye(camera: Camera, bend: np.ndarray) -> Camera:
-    """The camera with a fisheye lens; its field of view shrinks where the corner would look too far aside."""
+    """The camera with a fisheye lens; its field of view shrinks where the corner would look too far aside.
+
+    An image of few pixels, whose border looks much farther aside than its corner, has none.
+    """
     corner = corner_radius(camera)
     widest = 0.9 * np.radians(MAX_FISHEYE_DEG)
     if corner > widest:
@@ -136,5 +141,5 @@ def _fisheye(camera: Camera, bend: np.ndarray) -> Camera:
         k1, k2, k3, k4 = (float(strength * k) for k in bend * (1.0, 0.3, 0.1, 0.03))
         distortion = Distortion("fisheye", (k1, k2, k3, k4))
         if _is_invertible(distortion, corner) and _has_rays(distortion, camera):
-            break
-    return replace(camera, distortion=distortion)
+            return replace(camera, distortion=distortion)
+    return camera

@@ -31,6 +31,8 @@ _LEAST_PRIMARY = 0.05
 """Candle light has no blue within sRGB: this much is left, for the camera to amplify."""
 _VIEW_DEG = 55.0
 """Within this angle of the line of sight no area light turns its dark back to the camera."""
+_LEAST_REACH_M = 0.1
+"""From the focus to an area light: nearer, it would lie behind it or in a wall."""
 
 
 class Lighting(NamedTuple):
@@ -116,7 +118,8 @@ def _panel(
     distance: float,
     size_m: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, tuple[float, float]] | None:
-    """Place, direction from the focus and edges of an area light that fits; None where its back is in view.
+    """Place, direction from the focus and edges of an area light that fits; None where none does, or where
+    its back is in view.
 
     The four mirror images of the drawn direction are tried in turn.
     """
@@ -124,6 +127,8 @@ def _panel(
         outward = direction * (sx, sy, 1)
         width, height = np.minimum(size_m, 0.6 * space.reach(focus_m, outward, distance))
         reach = space.reach(focus_m, outward, distance, float(np.hypot(width, height)) / 2 - 0.15)
+        if reach < _LEAST_REACH_M:
+            continue
         position_m = focus_m + outward * reach
         to_light, to_focus = position_m - camera_m, focus_m - camera_m
         cosine = to_light @ to_focus / np.linalg.norm(to_light) / np.linalg.norm(to_focus)

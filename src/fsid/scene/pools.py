@@ -29,10 +29,10 @@ _GROUND = (
 )
 
 NATURE = (
-    *("bush", "bush", "bush", "branch", "branch", "tuft", "tuft", "stones", "stones", "flower", "rosette"),
-    *("fallen_leaves", "logs", "mushrooms", "pine_cones", "potted_plant", "cactus", "seashells"),
+    *("bush", "branch", "tuft", "stones", "flower", "rosette", "fallen_leaves", "logs", "mushrooms"),
+    *("pine_cones", "potted_plant", "cactus", "seashells"),
 )
-"""Mesh families that are common out of doors, as often as they stand here."""
+"""Mesh families that are common out of doors, all alike."""
 
 GROWN: dict[str, tuple[str, ...]] = {
     "leaf": ("leaves", "moss", "grass", "foliage", "dead_leaves"),

@@ -75,8 +75,8 @@ def sample(
     B, mood = background_rand(np.random.default_rng(streams.B), config)
     space, outdoors = space_of(B), B.kind == "open-air"
     low, rng = variant != "full", np.random.default_rng(streams.camera)
-    view, focus = camera_rand(rng, config.camera, B, width, height, low=low)
-    cameras = _cameras_rand(streams, config, view, B)
+    view, focus, depth_m = camera_rand(rng, config.camera, B, width, height, low=low)
+    cameras = _cameras_rand(streams, config, view, depth_m, B)
     sky_source = sky_rand(np.random.default_rng(streams.sky), config) if outdoors else None
     lighting = lighting_rand(
         streams.lights, config.lights, space, focus, np.array(view.position_m), sky_source
@@ -169,11 +169,13 @@ def _scattered_rand(
     return tuple(scattered(rngs, objects, space, focus_m, keep_clear_m, config.placement))
 
 
-def _cameras_rand(streams: Streams, config: SceneConfig, view: Camera, B: Background) -> tuple[Camera, ...]:
+def _cameras_rand(
+    streams: Streams, config: SceneConfig, view: Camera, depth_m: float, B: Background
+) -> tuple[Camera, ...]:
     """The drawn view through its lens, then all eyes and frames, alike but for where they stand."""
     rngs = (np.random.default_rng(s) for s in (streams.lens, streams.rig, streams.shake))
     lens, rig, shake = rngs
-    eyes = rig_rand(rig, config.rig, lens_rand(lens, config.lens, view), B)
+    eyes = rig_rand(rig, config.rig, lens_rand(lens, config.lens, view, depth_m), B)
     return burst_rand(shake, config.motion, eyes)
 
 

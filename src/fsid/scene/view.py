@@ -45,8 +45,9 @@ def camera_rand(
     height: int,
     *,
     low: bool = False,
-) -> tuple[Camera, np.ndarray]:
-    """A camera inside a background, and the focus (3,) in metres, which it looks at, or above it at the sky.
+) -> tuple[Camera, np.ndarray, float]:
+    """A camera inside a background, the focus (3,) in metres, which it looks at, or above it at the sky, and
+    how far from it is what it would look at otherwise.
 
     One that stands in the hills stands as much higher as they are there. low: nothing rises above the focus,
     so that it stays in the picture.
@@ -66,6 +67,7 @@ def camera_rand(
         position[2] += ground_height_m(background.size_m, position[0], position[1])
     target = focus + rng.normal(0, 0.12, 3) * np.linalg.norm(position - focus)
     roll, fov_deg = np.radians(rng.normal(0, config.roll_deg)), float(rng.uniform(*config.fov_deg))
+    depth = float(np.linalg.norm(np.subtract(vec3(target), vec3(position))))
     if skyward:
         ahead = target - position
         half = np.tan(np.radians(fov_deg / 2)) * height / width
@@ -81,7 +83,7 @@ def camera_rand(
         right = direction_of(azimuth_deg + 90, 0)
     right /= np.linalg.norm(right)
     up = np.cos(roll) * np.cross(right, forward) + np.sin(roll) * right
-    return Camera(vec3(position), vec3(target), vec3(up), fov_deg, width, height), focus
+    return Camera(vec3(position), vec3(target), vec3(up), fov_deg, width, height), focus, depth
 
 
 def rig_rand(
@@ -106,9 +108,13 @@ def _are_inside(eyes_m: np.ndarray, background: Background) -> bool:
     """Whether places (E, 3), around one that `camera_rand` has drawn, are off walls and above the ground."""
     space = space_of(background)
     slack_m = np.array((EYE_SLACK_M, EYE_SLACK_M, EYE_SLACK_M / 3))
-    if not ((eyes_m > space.low - slack_m) & (eyes_m < space.high + slack_m)).all():
+    outdoors = background.kind == "open-air"
+    high = (
+        np.array((*space.high[:2], np.inf)) if outdoors else space.high
+    )  # hills may be higher than the sky box
+    if not ((eyes_m > space.low - slack_m) & (eyes_m < high + slack_m)).all():
         return False
-    if background.kind != "open-air":
+    if not outdoors:
         return True
     ground_m = ground_height_m(background.size_m, eyes_m[:, 0], eyes_m[:, 1])
     return bool((eyes_m[:, 2] > ground_m + space.low[2] - slack_m[2]).all())
