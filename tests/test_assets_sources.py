@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import re
+import struct
 import zipfile
 from pathlib import Path
 
@@ -390,8 +391,8 @@ def test_materials_of_one_gltf_mesh_name_its_parts(tmp_path: Path):
     mesh = load_source(f"file:{tmp_path}/cup.gltf")
     assert len(mesh.faces) == 24
     assert np.ptp(mesh.vertices, axis=0) == pytest.approx((5, 3, 2))
-    assert mesh.part_names == ("Glass", "Glass_1", "Steel brushed", "Steel brushed_1", "material2", "Cup")
-    assert np.bincount(mesh.face_parts).tolist() == [4] * 6
+    assert mesh.part_names == ("Glass", "Steel brushed", "material2", "Cup")
+    assert np.bincount(mesh.face_parts).tolist() == [8, 8, 4, 4]
 
 
 def test_shape_keys_and_what_else_is_left_of_a_gltf_may_be_sparse_or_huge(tmp_path: Path):
@@ -554,3 +555,58 @@ def test_the_largest_parts_are_kept_in_the_order_of_the_file():
     names = tuple(f"{side:.0f}" for side in sides)
     mesh = clean(Triangles(vertices, np.arange(42).reshape(14, 3), np.arange(14), names))
     assert mesh.part_names == (*(name for name in names if int(name) > 3), "other")
+
+
+PRISM = np.array([(0, 0), (3, 0), (3, 1), (1, 1), (1, 2), (0, 2)], float)
+"""An L, of area 4: its prism of height 1 has a surface of 18."""
+
+
+def ply(order: str, faces: list[tuple[int, ...]], points: np.ndarray, extra: bool = False) -> bytes:
+    """As text or binary. extra: colours beside both, and an element before and after them."""
+    properties = ["property float x", "property double y", "property float z"]
+    text = f"ply\nformat {order} 1.0\ncomment by hand\n"
+    before = "element camera 1\nproperty list uchar float view\nproperty short n\n" if extra else ""
+    colour = "property uchar red\n" if extra else ""
+    of_faces = "property list ushort int vertex_indices\n"
+    text += f"{before}element vertex {len(points)}\n{colour}" + "".join(f"{p}\n" for p in properties)
+    text += f"element face {len(faces)}\n{colour}{of_faces}"
+    text += "element edge 1\nproperty int vertex1\nend_header\n"
+    rows: list[list[tuple[str, float]]] = []
+    if extra:
+        rows.append([("B", 2), ("f", 0.5), ("f", 0.25), ("h", -7)])
+    red = [("B", 200)] if extra else []
+    rows += [[*red, ("f", x), ("d", y), ("f", z)] for x, y, z in points]
+    rows += [[*red, ("H", len(face)), *(("i", c) for c in face)] for face in faces]
+    rows.append([("i", 0)])
+    if order == "ascii":
+        return (text + "".join(" ".join(f"{v:g}" for _, v in row) + "\n" for row in rows)).encode()
+    mark = "<" if "little" in order else ">"
+    return text.encode() + b"".join(struct.pack(mark + kind, value) for row in rows for kind, value in row)
+
+
+@pytest.mark.parametrize("extra", [False, True])
+@pytest.mark.parametrize("order", ["ascii", "binary_little_endian", "binary_big_endian"])
+def test_a_ply_may_have_faces_of_any_number_of_corners(tmp_path: Path, order: str, extra: bool):
+    """As Blender writes what is not triangulated: sides of four corners, ends of six that are concave."""
+    points = np.concatenate([np.pad(PRISM, ((0, 0), (0, 1)), constant_values=z) for z in (0, 1)])
+    sides = [(i, (i + 1) % 6, (i + 1) % 6 + 6, i + 6) for i in range(6)]
+    (tmp_path / "l.ply").write_bytes(
+        ply(order, [*sides, (5, 4, 3, 2, 1, 0), tuple(range(6, 12))], points, extra)
+    )
+    mesh = load_source(f"file:{tmp_path}/l.ply")
+    assert np.ptp(mesh.vertices, axis=0) == pytest.approx((3, 2, 1))
+    corners = mesh.vertices[mesh.faces]
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+    assert areas.sum() == pytest.approx(18)
+    (tmp_path / "quads.ply").write_bytes(ply(order, sides, points, extra))  # all of one size
+    assert len(load_source(f"file:{tmp_path}/quads.ply").faces) == 12
+
+
+@pytest.mark.parametrize("order", ["ascii", "binary_little_endian"])
+def test_a_ply_that_ends_early_is_refused(tmp_path: Path, order: str):
+    points = np.pad(PRISM, ((0, 0), (0, 1)))
+    whole = ply(order, [(0, 1, 2), (0, 1, 2, 3)], points)
+    for cut in (3, 20, 40):
+        (tmp_path / "cut.ply").write_bytes(whole[:-cut])
+        with pytest.raises(FsidError, match="shorter than its header"):
+            load_source(f"file:{tmp_path}/cut.ply")

@@ -189,6 +189,9 @@ def test_a_stored_layer_is_what_was_baked(renderer: Renderer) -> None:
 def test_too_little_texture_memory_is_said(renderer: Renderer) -> None:
     with pytest.raises(FsidError, match="smaller texture_size"):
         TextureArray(renderer._context, 8192, 2048)
+    most = renderer._context.info["GL_MAX_ARRAY_TEXTURE_LAYERS"]
+    with pytest.raises(FsidError, match=f"{most + 1} materials are more than the {most} "):
+        TextureArray(renderer._context, 64, most + 1)
 
 
 def live_gl_objects() -> int:

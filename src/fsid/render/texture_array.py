@@ -33,6 +33,11 @@ class TextureArray:
     def __init__(
         self, context: moderngl.Context, size: int, capacity: int, *, buffered: bool = False
     ) -> None:
+        most = int(context.info["GL_MAX_ARRAY_TEXTURE_LAYERS"])
+        if capacity > most:
+            raise FsidError(
+                f"{capacity} materials are more than the {most} that this driver takes in a scene"
+            )
         self.capacity = capacity
         self._context = context
         self._buffered = buffered

@@ -27,7 +27,7 @@ from fsid.assets.bake_cache import cache_folder
 from fsid.assets.mesh import Mesh
 from fsid.assets.sources.limits import RefusedError
 
-_VERSION = 4
+_VERSION = 5
 """One more whenever the same file gives another mesh."""
 
 

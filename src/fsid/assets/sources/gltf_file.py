@@ -38,8 +38,11 @@ _INTEGERS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4"}
 _URI = re.compile(rb'"uri"\s*:\s*("(?!data:)(?:[^"\\]|\\.){1,1000}")')
 
 
-def plain_gltf(data: bytes, fetch: Fetch) -> tuple[bytes, dict[str, bytes]]:
-    """A .glb or .gltf as (JSON document, its buffers by name); meshes carry their material's name.
+def plain_gltf(data: bytes, fetch: Fetch) -> tuple[bytes, dict[str, bytes], list[str]]:
+    """A .glb or .gltf as (JSON document, its buffers by name, names of materials).
+
+    Meshes are called 0.part, 1.part ..., after the place of their material in the list: the reader appends to
+    names what makes each piece's another one.
 
     Raises RefusedError; any other exception means that the document is malformed.
     """
@@ -56,12 +59,12 @@ def plain_gltf(data: bytes, fetch: Fetch) -> tuple[bytes, dict[str, bytes]]:
     _check_graph(document)
     _float_positions(document, buffers)
     _list_fans(document, buffers)
-    _split_by_material(document)
+    materials = _split_by_material(document)
     if not document.get("scenes"):
         document |= {"scene": 0, "scenes": [{"nodes": sorted(_roots(document.get("nodes", [])))}]}
     plain = {key: document[key] for key in _KEPT if key in document}
     plain["buffers"] = [{"uri": name, "byteLength": len(content)} for name, content in buffers.items()]
-    return json.dumps(plain).encode(), buffers
+    return json.dumps(plain).encode(), buffers, materials
 
 
 def referred(data: bytes) -> list[str]:
@@ -229,8 +232,9 @@ def _triangles(primitive: dict[str, Any], accessors: list[dict[str, Any]]) -> in
     return corners // 3 if mode == _LIST else max(corners - 2, 0) if mode in (_STRIP, _FAN) else 0
 
 
-def _split_by_material(document: dict[str, Any]) -> None:
-    """A mesh of each material, under its name, instead of every mesh; a node of several gets children."""
+def _split_by_material(document: dict[str, Any]) -> list[str]:
+    """A mesh of each material instead of every mesh; a node of several gets children. The materials."""
+    names: list[str] = []
     materials, nodes = document.get("materials", []), document.get("nodes", [])
     meshes: list[dict[str, Any]] = []
     split = []
@@ -241,7 +245,8 @@ def _split_by_material(document: dict[str, Any]) -> None:
         split.append(range(len(meshes), len(meshes) + len(groups)))
         for i, primitives in groups.items():
             name = mesh.get("name", "part") if i is None else materials[i].get("name", f"material{i}")
-            meshes.append({"name": str(name), "primitives": primitives})
+            meshes.append({"name": f"{len(names)}.part", "primitives": primitives})
+            names.append(str(name))
     for node in [node for node in nodes if "mesh" in node]:
         shown = split[node.pop("mesh")]
         if len(shown) == 1:
@@ -250,3 +255,4 @@ def _split_by_material(document: dict[str, Any]) -> None:
             node["children"] = [*node.get("children", ()), *range(len(nodes), len(nodes) + len(shown))]
             nodes += [{"mesh": mesh} for mesh in reversed(shown)]  # the reader takes the last child first
     document["meshes"] = meshes
+    return names
