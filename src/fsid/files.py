@@ -177,8 +177,9 @@ def held(folder: Path, taken: str) -> Iterator[bool]:
 @contextlib.contextmanager
 def _held_by_file(folder: Path, taken: str) -> Iterator[bool]:
     """As `held`, by a hidden file in `folder`: NFS locks only what is open for writing, as no folder is."""
-    with (folder / ".fsid.lock").open("ab") as file:
+    with contextlib.ExitStack() as stack:
         try:
+            file = stack.enter_context((folder / ".fsid.lock").open("ab"))
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             alone = True
         except BlockingIOError:

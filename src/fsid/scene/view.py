@@ -109,9 +109,7 @@ def _are_inside(eyes_m: np.ndarray, background: Background) -> bool:
     space = space_of(background)
     slack_m = np.array((EYE_SLACK_M, EYE_SLACK_M, EYE_SLACK_M / 3))
     outdoors = background.kind == "open-air"
-    high = (
-        np.array((*space.high[:2], np.inf)) if outdoors else space.high
-    )  # hills may be higher than the sky box
+    high = np.array((*space.high[:2], np.inf)) if outdoors else space.high  # hills end where they end
     if not ((eyes_m > space.low - slack_m) & (eyes_m < high + slack_m)).all():
         return False
     if not outdoors:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import struct
 import warnings
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -45,6 +45,23 @@ class _Element:
     name: str
     count: int
     properties: list[_Property] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class _Places:
+    """Where the values of each property of each row begin, and how many they are, (rows, properties).
+
+    width: of rows that are all alike, of which only the first is here; 0 where all are.
+    """
+
+    starts: np.ndarray
+    lengths: np.ndarray
+    width: int = 0
+
+    @staticmethod
+    def of(rows: list[list[tuple[int, int]]], properties: int) -> _Places:
+        found = np.array(rows, np.int64).reshape(len(rows), properties, 2)
+        return _Places(found[..., 0], found[..., 1])
 
 
 def read_ply(data: bytes) -> Triangles:
@@ -101,58 +118,58 @@ class _Rows:
 
     def __init__(self) -> None:
         self._at = 0
-        self._found: tuple[_Element, np.ndarray, np.ndarray] | None = None
+        self._found: tuple[_Element, _Places] | None = None
 
     def column(self, element: _Element, place: int) -> np.ndarray:
         """(count,) float64 of the property at `place`."""
-        starts, _ = self._places(element)
-        return self._values(starts[:, place], element.properties[place].kind).astype(np.float64)
+        return self._numbers_of(element, place)[1].astype(np.float64)
 
     def lists(self, element: _Element, place: int) -> tuple[np.ndarray, np.ndarray]:
         """Lengths (count,) of the list at `place` of every row, and its numbers, one row after the other."""
-        starts, lengths = self._places(element)
-        sizes, step = lengths[:, place], self._step(element.properties[place].kind)
-        within = np.arange(sizes.sum()) - np.repeat(np.cumsum(sizes) - sizes, sizes)
-        at = np.repeat(starts[:, place], sizes) + step * within
-        return sizes, self._values(at, element.properties[place].kind).astype(np.int64)
+        sizes, numbers = self._numbers_of(element, place)
+        return sizes, numbers.astype(np.int64)
 
     def passed(self, element: _Element) -> None:
         """What follows is the next element."""
         self._places(element)
         self._found = None
 
-    def _places(self, element: _Element) -> tuple[np.ndarray, np.ndarray]:
-        """Where the values of each property of each row begin, and how many they are, (count, properties)."""
-        if self._found is None or self._found[0] is not element:
-            if element.count:
-                self._found = (element, *self._alike(element))
-            else:
-                none = np.zeros((0, len(element.properties)), np.int64)
-                self._found = (element, none, none)
-        return self._found[1:]
+    def _numbers_of(self, element: _Element, place: int) -> tuple[np.ndarray, np.ndarray]:
+        found, kind = self._places(element), element.properties[place].kind
+        starts, sizes = found.starts[:, place], found.lengths[:, place]
+        if found.width:
+            table = self._table(starts[0], found.width, (element.count, int(sizes[0])), kind)
+            return np.full(element.count, sizes[0]), table.ravel()
+        within = np.arange(sizes.sum()) - np.repeat(np.cumsum(sizes) - sizes, sizes)
+        return sizes, self._values(np.repeat(starts, sizes) + self._step(kind) * within, kind)
 
-    def _alike(self, element: _Element) -> tuple[np.ndarray, np.ndarray]:
-        """As if all rows were like the first; else row by row."""
-        first, end = self._row(element, self._at)
-        width = end - self._at
-        starts, lengths = np.array(first, np.int64).reshape(-1, 2).T
-        shift = width * np.arange(element.count)[:, None]
-        if element.count * width <= self._length() - self._at:
-            is_alike = True
-            for place, each in enumerate(element.properties):
-                if each.length_kind:
-                    at = starts[place] - self._step(each.length_kind) + shift[:, 0]
-                    is_alike &= bool((self._values(at, each.length_kind) == lengths[place]).all())
-            if is_alike:
-                self._at += element.count * width
-                return starts + shift, np.broadcast_to(lengths, (element.count, len(first)))
-        rows, at = [], self._at
+    def _places(self, element: _Element) -> _Places:
+        if self._found is None or self._found[0] is not element:
+            self._found = (element, self._alike(element) or self._row_by_row(element))
+        return self._found[1]
+
+    def _alike(self, element: _Element) -> _Places | None:
+        """Of rows that are all like the first; None where they are not."""
+        if not element.count:
+            return None
+        row, end = self._row(element, self._at)
+        found, width = _Places.of([row], len(row)), end - self._at
+        if element.count * width > self._length() - self._at:
+            return None
+        for (start, length), each in zip(row, element.properties, strict=True):
+            if each.length_kind:
+                at = start - self._step(each.length_kind)
+                if (self._table(at, width, (element.count, 1), each.length_kind) != length).any():
+                    return None
+        self._at += element.count * width
+        return replace(found, width=width)
+
+    def _row_by_row(self, element: _Element) -> _Places:
+        rows = []
         for _ in range(element.count):
-            row, at = self._row(element, at)
+            row, self._at = self._row(element, self._at)
             rows.append(row)
-        self._at = at
-        found = np.array(rows, np.int64)
-        return found[..., 0], found[..., 1]
+        return _Places.of(rows, len(element.properties))
 
     def _row(self, element: _Element, at: int) -> tuple[list[tuple[int, int]], int]:
         """(start, length) of each property of the row that begins at `at`, and where it ends."""
@@ -186,6 +203,10 @@ class _Rows:
         """The numbers at these places."""
         raise NotImplementedError
 
+    def _table(self, at: int, width: int, shape: tuple[int, int], kind: str) -> np.ndarray:
+        """Numbers that follow each other, in rows that begin at `at` and then every `width` places."""
+        raise NotImplementedError
+
 
 class _Text(_Rows):
     """Places are numbers in the order of the file."""
@@ -211,6 +232,9 @@ class _Text(_Rows):
     def _values(self, at: np.ndarray, kind: str) -> np.ndarray:
         return self._numbers[at]
 
+    def _table(self, at: int, width: int, shape: tuple[int, int], kind: str) -> np.ndarray:
+        return np.ndarray(shape, np.float64, self._numbers.data, 8 * at, (8 * width, 8))
+
 
 class _Binary(_Rows):
     """Places are bytes."""
@@ -231,3 +255,6 @@ class _Binary(_Rows):
     def _values(self, at: np.ndarray, kind: str) -> np.ndarray:
         size = self._step(kind)
         return self._bytes[at[:, None] + np.arange(size)].view(self._order + kind)[:, 0]
+
+    def _table(self, at: int, width: int, shape: tuple[int, int], kind: str) -> np.ndarray:
+        return np.ndarray(shape, self._order + kind, self._body, at, (width, self._step(kind)))
