@@ -47,7 +47,7 @@ class _Element:
     properties: list[_Property] = field(default_factory=list)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Places:
     """Where the values of each property of each row begin, and how many they are, (rows, properties).
 
