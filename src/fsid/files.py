@@ -153,37 +153,26 @@ def held(folder: Path, taken: str) -> Iterator[bool]:
     or where another process has it: `taken` says what that does.
     """
     make_folder(folder)
-    try:
-        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    except OSError as error:
-        raise FsidError(f"{folder}: cannot be written ({error.strerror})") from None
-    try:
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            alone = True
-        except BlockingIOError:
-            raise FsidError(f"{folder}: {taken}; wait for it or stop it") from None
-        except OSError:
-            alone = False
-        if alone:
-            yield alone
-        else:
-            with _held_by_file(folder, taken) as alone:
-                yield alone
-    finally:
-        os.close(descriptor)
-
-
-@contextlib.contextmanager
-def _held_by_file(folder: Path, taken: str) -> Iterator[bool]:
-    """As `held`, by a hidden file in `folder`: NFS locks only what is open for writing, as no folder is."""
     with contextlib.ExitStack() as stack:
         try:
-            file = stack.enter_context((folder / ".fsid.lock").open("ab"))
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            alone = True
-        except BlockingIOError:
-            raise FsidError(f"{folder}: {taken}; wait for it or stop it") from None
-        except OSError:
-            alone = False
+            descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+        except OSError as error:
+            raise FsidError(f"{folder}: cannot be written ({error.strerror})") from None
+        stack.callback(os.close, descriptor)
+        alone = _lock(descriptor, folder, taken)
+        if not alone:  # NFS locks only what is open for writing, as no folder is
+            with contextlib.suppress(OSError):
+                file = stack.enter_context((folder / ".fsid.lock").open("ab"))
+                alone = _lock(file.fileno(), folder, taken)
         yield alone
+
+
+def _lock(descriptor: int, folder: Path, taken: str) -> bool:
+    """Lock what is open until it is closed; False where its file system knows no lock for it."""
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise FsidError(f"{folder}: {taken}; wait for it or stop it") from None
+    except OSError:
+        return False
+    return True

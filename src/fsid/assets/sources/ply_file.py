@@ -71,14 +71,16 @@ def read_ply(data: bytes) -> Triangles:
     vertices, sizes, corners = np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros(0, np.int64)
     for element in elements:
         names = [each.name for each in element.properties]
+        places = rows.places(element)
         if element.name == "vertex":
-            vertices = np.stack([rows.column(element, names.index(axis)) for axis in "xyz"], axis=-1)
+            columns = [rows.numbers(element, places, names.index(axis))[1] for axis in "xyz"]
+            vertices = np.stack(columns, axis=-1).astype(np.float64)
         elif element.name == "face":
             place = next((names.index(name) for name in _CORNERS if name in names), None)
             if place is None or not element.properties[place].length_kind:
                 raise RefusedError("faces without corners")
-            sizes, corners = rows.lists(element, place)
-        rows.passed(element)
+            sizes, corners = rows.numbers(element, places, place)
+            corners = corners.astype(np.int64)
     if len(corners) > 3 * MAX_TRIANGLES:
         raise RefusedError(f"more than {MAX_TRIANGLES:,} triangles")
     if len(corners) and not 0 <= corners.min() <= corners.max() < len(vertices):
@@ -118,35 +120,19 @@ class _Rows:
 
     def __init__(self) -> None:
         self._at = 0
-        self._found: tuple[_Element, _Places] | None = None
 
-    def column(self, element: _Element, place: int) -> np.ndarray:
-        """(count,) float64 of the property at `place`."""
-        return self._numbers_of(element, place)[1].astype(np.float64)
+    def places(self, element: _Element) -> _Places:
+        """Of the next element, which follows those that were asked for."""
+        return self._alike(element) or self._row_by_row(element)
 
-    def lists(self, element: _Element, place: int) -> tuple[np.ndarray, np.ndarray]:
-        """Lengths (count,) of the list at `place` of every row, and its numbers, one row after the other."""
-        sizes, numbers = self._numbers_of(element, place)
-        return sizes, numbers.astype(np.int64)
-
-    def passed(self, element: _Element) -> None:
-        """What follows is the next element."""
-        self._places(element)
-        self._found = None
-
-    def _numbers_of(self, element: _Element, place: int) -> tuple[np.ndarray, np.ndarray]:
-        found, kind = self._places(element), element.properties[place].kind
-        starts, sizes = found.starts[:, place], found.lengths[:, place]
+    def numbers(self, element: _Element, found: _Places, place: int) -> tuple[np.ndarray, np.ndarray]:
+        """How many the property at `place` has in every row, (count,), and these, one row after the other."""
+        kind, starts, sizes = element.properties[place].kind, found.starts[:, place], found.lengths[:, place]
         if found.width:
             table = self._table(starts[0], found.width, (element.count, int(sizes[0])), kind)
             return np.full(element.count, sizes[0]), table.ravel()
         within = np.arange(sizes.sum()) - np.repeat(np.cumsum(sizes) - sizes, sizes)
         return sizes, self._values(np.repeat(starts, sizes) + self._step(kind) * within, kind)
-
-    def _places(self, element: _Element) -> _Places:
-        if self._found is None or self._found[0] is not element:
-            self._found = (element, self._alike(element) or self._row_by_row(element))
-        return self._found[1]
 
     def _alike(self, element: _Element) -> _Places | None:
         """Of rows that are all like the first; None where they are not."""
