@@ -19,7 +19,7 @@ wherever noise spreads over several integers, as in every published table.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from scipy.special import gammaincinv
@@ -59,7 +59,8 @@ class Samples:
 
     signal, variance: (m,) DN above black and DN^2. freedom: (m,) degrees of freedom. used: (m,) bool, False
     where the fit leaves the pool out (beyond the linear range, or too little left by the converter).
-    banding: (m,) DN^4, squared error of the variance beyond that of independent pixels.
+    banding: (m,) DN^4, squared error of the variance beyond that of independent pixels. towards_light: (m,)
+    DN that the signal is too low, were all noise read noise (`_towards_light`).
     """
 
     signal: np.ndarray
@@ -67,16 +68,28 @@ class Samples:
     freedom: np.ndarray
     used: np.ndarray
     banding: np.ndarray
+    towards_light: np.ndarray
 
     def in_use(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """signal, variance and freedom of the pools that the fit takes."""
         signal, variance, freedom = (v[self.used] for v in (self.signal, self.variance, self.freedom))
         return signal, variance, freedom
 
+    def signal_by(self, k: float, sigma2: float) -> np.ndarray:
+        """(m,) DN, `signal` moved by as much of `towards_light` as noise that is k signal + sigma2 asks for.
+
+        Pixels are pooled by their mean over time, m, and noise made some of these too low or high. With read
+        noise alone their variance is that of their light. The variance s2 of shot noise, which is skewed
+        (third moment k^2 signal), is not independent of m, E(s2 | m) = V + k (m - light): such pixels lie on
+        the line already.
+        """
+        model = np.maximum(k * self.signal + sigma2, 1e-3)
+        return self.signal + self.towards_light * np.clip(sigma2 / model, 0, 1)
+
     @staticmethod
     def joined(parts: Sequence[Samples]) -> Samples:
         """All pools of several bursts or sites."""
-        names = ("signal", "variance", "freedom", "used", "banding")
+        names = [field.name for field in fields(Samples)]
         return Samples(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
@@ -112,26 +125,35 @@ def fit_noise(
     if not bursts:
         raise FsidError("calibration needs at least one burst of a lit scene")
     cfa = None if cfa == MONO else cfa
+    left_out = None
     if dark is not None:
-        dark_samples, black = pool_dark(dark, cfa, white_level)
+        left_out = defective(dark.mean())
+        dark_samples, black = pool_dark(dark, cfa, white_level, left_out=left_out)
         pooled = [dark_samples]
     elif black_level is not None:
         tile = BlackLevels.stated(black_level, cfa, "black_level").tile
         black, pooled = (tile[0, :1] if cfa is None else pack(tile, cfa).ravel()), []
     else:
         raise FsidError("calibration needs dark frames or the black level in DN")
-    return fit_samples([*pooled, *(pool(burst, cfa, black, white_level) for burst in bursts)], black)
+    lit = (pool(burst, cfa, black, white_level, left_out) for burst in bursts)
+    return fit_samples([*pooled, *lit], black)
 
 
 def pool_dark(
-    dark: TemporalStatistics, cfa: str | None, white_level: int, black: np.ndarray | None = None
+    dark: TemporalStatistics,
+    cfa: str | None,
+    white_level: int,
+    black: np.ndarray | None = None,
+    *,
+    left_out: np.ndarray,
 ) -> tuple[tuple[Samples, ...], np.ndarray]:
     """(one `Samples` of one pool per site, level in DN of each site) of dark frames.
 
     black: DN of each site, where it is known from shorter dark frames; else the level is the black level.
+    left_out: (H, W) bool, pixels of these frames that are `defective`.
     """
-    far, largest = defective(dark.mean()), _largest(dark.frames)
-    sites = dark.sites(cfa, far)
+    largest = _largest(dark.frames)
+    sites = dark.sites(cfa, left_out)
     if min(mean.size for mean, _ in sites) < _MIN_POOL_PIXELS:
         raise FsidError("the dark frames are clipped everywhere; check that the lens was covered")
     found = []
@@ -141,23 +163,30 @@ def pool_dark(
     levels = np.array([site.level for site in found])
     signals = levels - (levels if black is None else black)
     samples = []
-    factors = dark.banding_factors(cfa, far, largest)
+    factors = dark.banding_factors(cfa, left_out, largest)
     for site, signal, factor in zip(found, signals, factors, strict=True):
         known = np.isfinite(site.variance_error)
         freedom = 2 * (site.variance / max(site.variance_error, 1e-9)) ** 2 if known else 0.0
         banding = (factor - 1) * site.variance_error**2 if known else 0.0
-        values = (signal, site.variance, freedom, known, banding)
+        values = (signal, site.variance, freedom, known, banding, 0.0)
         samples.append(Samples(*(np.array([v]) for v in values)))
     return tuple(samples), levels
 
 
 def pool(
-    burst: TemporalStatistics, cfa: str | None, black: np.ndarray, white_level: int
+    burst: TemporalStatistics,
+    cfa: str | None,
+    black: np.ndarray,
+    white_level: int,
+    left_out: np.ndarray | None = None,
 ) -> tuple[Samples, ...]:
-    """Pixels of like mean, one `Samples` per site; black: DN of each site. FsidError if the scene moved."""
+    """Pixels of like mean, one `Samples` per site; black: DN of each site. FsidError if the scene moved.
+
+    left_out: (H, W) bool, pixels that are `defective` in the dark.
+    """
     return tuple(
         _pool(mean, variance, burst.frames, float(site_black), white_level)
-        for (mean, variance), site_black in zip(burst.sites(cfa), black, strict=True)
+        for (mean, variance), site_black in zip(burst.sites(cfa, left_out), black, strict=True)
     )
 
 
@@ -169,7 +198,9 @@ def fit_samples(
     if tie_greens and len(sites) == 4:
         sites[1] = sites[2] = Samples.joined(sites[1:3])
     k, sigma2, k_error, sigma2_error = np.array([_line(samples) for samples in sites]).T
-    return NoiseFit(k, sigma2, k_error, sigma2_error, black, tuple(sites))
+    lines = zip(sites, k, sigma2, strict=True)
+    moved = tuple(replace(s, signal=s.signal_by(*line)) for s, *line in lines)
+    return NoiseFit(k, sigma2, k_error, sigma2_error, black, moved)
 
 
 def departure(fit: NoiseFit) -> float:
@@ -208,14 +239,14 @@ def _pool(mean: np.ndarray, variance: np.ndarray, frames: int, black: float, whi
     order = np.argsort(mean)
     signal, variance = mean[order] - black, variance[order]
     if signal.size < _MIN_POOL_PIXELS:
-        return Samples(np.empty(0), np.empty(0), np.empty(0), np.empty(0, bool), np.empty(0))
+        nothing = np.empty(0)
+        return Samples(nothing, nothing, nothing, np.empty(0, bool), nothing, nothing)
     starts = _starts(signal, variance, frames, white - black)
     sound = _sound(signal, variance, starts, frames, LINEAR_SHARE * (white - black))
     count = np.add.reduceat(sound, starts, dtype=np.int64)
     full = count >= _MIN_POOL_PIXELS
     fractions = _fractions(signal + black, sound, starts)[full]
     mean, stored = (np.add.reduceat(v * sound, starts)[full] / count[full] for v in (signal, variance))
-    mean = mean + _towards_light(signal, variance * sound, starts, frames)[full]
     level, unclipped, clipped = before_clipping(mean + black, stored, 0, white)
     tau2, slope = before_rounding(unclipped, fractions)
     resolved = (stored > RESOLVED_DN2) | ((tau2 > _LEAST_TAU2) & (slope < _STEEPEST))
@@ -223,7 +254,8 @@ def _pool(mean: np.ndarray, variance: np.ndarray, frames: int, black: float, whi
     restored = np.where(resolved, tau2 + ROUNDING_DN2, stored)
     rarity = np.minimum(1, 2 * stored / np.maximum(1 - stored, stored))  # Gaussian against rare steps of 1 DN
     freedom = count[full] * (frames - 1.0) * rarity * (restored / (slope * np.maximum(stored, 1e-9))) ** 2
-    return Samples(level - black, restored, freedom, used, np.zeros(len(level)))
+    towards_light = _towards_light(signal, variance * sound, starts, frames)[full]
+    return Samples(level - black, restored, freedom, used, np.zeros(len(level)), towards_light)
 
 
 def _fractions(level: np.ndarray, sound: np.ndarray, starts: np.ndarray) -> np.ndarray:
@@ -256,7 +288,7 @@ def _starts(signal: np.ndarray, variance: np.ndarray, frames: int, span: float) 
 
 
 def _towards_light(signal: np.ndarray, variance: np.ndarray, starts: np.ndarray, frames: int) -> np.ndarray:
-    """What the mean light of each pool's pixels lies above the mean of their ascending `signal`.
+    """What the mean light of each pool's pixels lies above the mean of their ascending `signal`, DN.
 
     E(light - signal) = s^2 (p(end) - p(start)) / P,      s^2 = variance / frames,  of Gaussian noise
 
@@ -310,6 +342,7 @@ def _line(samples: Samples) -> tuple[float, float, float, float]:
         if sigma2 < ROUNDING_DN2:
             sigma2 = ROUNDING_DN2
             k = float((weight * signal * (variance - sigma2)).sum() / (weight * signal**2).sum())
+        signal = samples.signal_by(k, sigma2)[samples.used]
         model = k * signal + sigma2
     error2 = error**2 * max(_scatter(variance - model, weight), 1.0)
     k_error, sigma2_error = np.sqrt(error2 + _by_banding(signal, weight, samples.banding[samples.used]))

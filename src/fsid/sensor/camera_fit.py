@@ -30,6 +30,7 @@ from fsid.sensor.calibrate import (
     pool_dark,
 )
 from fsid.sensor.camera_profile import CameraProfile
+from fsid.sensor.defects import defective
 from fsid.sensor.fitted_profile import profile_of, site_blacks
 from fsid.sensor.frames import Frame, FrameSet, Layout, bursts, find_frames
 from fsid.sensor.temporal import TemporalStatistics
@@ -154,13 +155,13 @@ def _fit_iso(reader: _Reader, iso: float, tie_greens: bool) -> NoiseFit:
             f"{counted(len(darks), 'dark frame')} of ISO {iso:g}; a "
             f"calibration needs at least {MIN_FRAMES} in all, and 20 or more to be good"
         )
-    black, pooled = _pool_dark(reader, iso, darks)
+    black, left_out, pooled = _pool_dark(reader, iso, darks)
     if black is None:
         raise FsidError(
             f"{lights[0].path}: ISO {iso:g} has no dark frames and no black level; "
             f"give --dark frames or --black-level"
         )
-    pooled += _pool_lights(reader, iso, lights, black)
+    pooled += _pool_lights(reader, iso, lights, black, left_out)
     try:
         fit = fit_samples(pooled, black, tie_greens=tie_greens)
     except FsidError as error:
@@ -174,13 +175,17 @@ def _fit_iso(reader: _Reader, iso: float, tie_greens: bool) -> NoiseFit:
     return fit
 
 
-def _pool_dark(reader: _Reader, iso: float, frames: list[Frame]) -> tuple[np.ndarray | None, list[_Pooled]]:
-    """Black level per site in DN, from the file where there are no frames, and what the frames pool to.
+def _pool_dark(
+    reader: _Reader, iso: float, frames: list[Frame]
+) -> tuple[np.ndarray | None, np.ndarray | None, list[_Pooled]]:
+    """(black level per site in DN, from the file where there are no frames; pixels that are defective in any
+    of them; what the frames pool to).
 
     The shortest exposure is the black level, of bare mosaics the lowest one; the others are dark current.
     """
     camera = reader.found.camera
     black = camera.site_black()
+    left_out: np.ndarray | None = None
     pooled: list[_Pooled] = []
     shortest_first = sorted(bursts(frames), key=lambda burst: (burst[0].exposure_s, burst[0].level))
     for number, burst in enumerate(shortest_first):
@@ -190,13 +195,16 @@ def _pool_dark(reader: _Reader, iso: float, frames: list[Frame]) -> tuple[np.nda
             reader.dark.append(finding)
         if stats.zero_share > CUT_OFF:
             reader.cut_off.append(iso)
-        samples, levels = pool_dark(stats, camera.cfa, camera.white_level, black if number > 0 else None)
+        far = defective(stats.mean())
+        left_out = far if left_out is None else left_out | far
+        shortest = black if number > 0 else None
+        samples, levels = pool_dark(stats, camera.cfa, camera.white_level, shortest, left_out=far)
         if number == 0:
             noise_dn = float(np.sqrt(np.mean([site.variance.mean() for site in samples])))
             _check_black(reader, float(levels.mean()), noise_dn, burst[0].path)
             black = levels
         pooled.append(samples)
-    return black, pooled
+    return black, left_out, pooled
 
 
 def _check_black(reader: _Reader, measured: float, noise_dn: float, path: Path) -> None:
@@ -210,7 +218,9 @@ def _check_black(reader: _Reader, measured: float, noise_dn: float, path: Path) 
     reader.blacks.append((stated, measured, path))
 
 
-def _pool_lights(reader: _Reader, iso: float, frames: list[Frame], black: np.ndarray) -> list[_Pooled]:
+def _pool_lights(
+    reader: _Reader, iso: float, frames: list[Frame], black: np.ndarray, left_out: np.ndarray | None
+) -> list[_Pooled]:
     """What the lit bursts pool to, a burst each; at least one has to be usable in every site."""
     camera = reader.found.camera
     shortest = shortest_dark(reader.dark, iso)
@@ -221,7 +231,7 @@ def _pool_lights(reader: _Reader, iso: float, frames: list[Frame], black: np.nda
         stats = reader.statistics(burst)
         _check_above(stats, float(black.mean()), camera.white_level, burst[0].path)
         try:
-            samples = pool(stats, camera.cfa, black, camera.white_level)
+            samples = pool(stats, camera.cfa, black, camera.white_level, left_out)
         except FsidError as error:
             raise FsidError(f"{burst[0].path}: {error}") from error
         if all(site.used.any() for site in samples):
