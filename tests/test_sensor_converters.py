@@ -21,6 +21,7 @@ from fsid.sensor import (
     write_dng,
 )
 from fsid.sensor.dng import read_header
+from fsid.sensor.dng_tags import d65_matrix
 from fsid.sensor.metadata import exposure_metadata
 from fsid.sensor.tiff import (
     ASCII,
@@ -59,6 +60,8 @@ def patch_means(image: np.ndarray) -> np.ndarray:
 
 MATRIX_A = [0.9, -0.3, -0.1, -0.4, 1.2, 0.2, -0.1, 0.2, 0.5]
 MATRIX_D65 = [0.8, -0.2, -0.1, -0.5, 1.3, 0.2, -0.1, 0.2, 0.6]
+CALIBRATION = np.array([[1.1, 0.0, 0.0], [0.0, 1.0, 0.02], [0.0, 0.0, 0.9]])
+BALANCE = [2.0, 1.0, 1.5]
 
 
 def foreign_dng(illuminants: tuple[int, int] = (17, 21)) -> bytes:
@@ -85,7 +88,8 @@ def foreign_dng(illuminants: tuple[int, int] = (17, 21)) -> bytes:
         Tag(50720, SHORT, (56, 44)),
         Tag(50721, SRATIONAL, rationals(MATRIX_A)),
         Tag(50722, SRATIONAL, rationals(MATRIX_D65)),
-        Tag(50727, RATIONAL, rationals([2.0, 1.0, 1.5])),
+        Tag(50724, SRATIONAL, rationals(CALIBRATION.ravel())),
+        Tag(50727, RATIONAL, rationals(BALANCE)),
         Tag(50728, RATIONAL, rationals([0.5, 1.0, 0.6])),
         Tag(50730, SRATIONAL, rationals([0.35])),
         Tag(50736, RATIONAL, rationals([24.0, 70.0, 2.8, 4.0])),
@@ -125,16 +129,26 @@ def test_the_header_of_a_foreign_file_is_read(foreign):
     header = read_header(foreign)
     assert (header.camera, header.iso, header.exposure_s) == ("Maker One", 1600.0, 0.02)
     assert header.date == "2026-11-21"
-    np.testing.assert_allclose(read_raw(foreign).xyz_to_camera.ravel(), MATRIX_D65, rtol=1e-9)
+    expected = np.diag(BALANCE) @ CALIBRATION @ np.reshape(MATRIX_D65, (3, 3))
+    np.testing.assert_allclose(read_raw(foreign).xyz_to_camera, expected, rtol=1e-9)
 
 
 @pytest.mark.parametrize("illuminants", [(17, 23), (17, 20), (17, 22), (3, 10), (14, 255), (20, 21)])
 def test_the_matrix_of_the_light_nearest_to_d65_is_read(tmp_path, illuminants):
-    """Standard light A and D50, D55 or D75, a lamp and clouds, a lamp and an unknown light, D55 and D65."""
-    for pair, matrix in ((illuminants, MATRIX_D65), (illuminants[::-1], MATRIX_A)):
+    """Standard light A and D50, D55 or D75, a lamp and clouds, a lamp and an unknown light, D55 and D65; and
+    what this unit differs by from its model in the second one."""
+    second, first = CALIBRATION @ np.reshape(MATRIX_D65, (3, 3)), np.reshape(MATRIX_A, (3, 3))
+    for pair, matrix in ((illuminants, second), (illuminants[::-1], first)):
         (tmp_path / "a.dng").write_bytes(foreign_dng(pair))
         back = read_raw(written(tmp_path / "b.dng", read_raw(tmp_path / "a.dng")))
-        np.testing.assert_allclose(back.xyz_to_camera.ravel(), matrix, rtol=1e-9)
+        np.testing.assert_allclose(back.xyz_to_camera, np.diag(BALANCE) @ matrix, rtol=1e-9)
+
+
+def test_a_calibration_of_another_profile_does_not_count():
+    tags = {50721: MATRIX_A, 50723: tuple(CALIBRATION.ravel()), 50931: b"one\0", 50932: b"another\0"}
+    np.testing.assert_array_equal(d65_matrix(tags), np.reshape(MATRIX_A, (3, 3)))
+    matched = d65_matrix(tags | {50932: b"one\0"})
+    np.testing.assert_allclose(matched, CALIBRATION @ np.reshape(MATRIX_A, (3, 3)))
 
 
 def test_what_was_replaced_is_not_contradicted_by_what_was_kept(foreign, tmp_path):

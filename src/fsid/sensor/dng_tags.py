@@ -48,6 +48,8 @@ EXIF_ISO = 34855
 DNG_VERSION, DNG_BACKWARD_VERSION, UNIQUE_CAMERA_MODEL = 50706, 50707, 50708
 CFA_PLANE_COLOUR, CFA_LAYOUT, BLACK_REPEAT, BLACK_LEVEL, WHITE_LEVEL = 50710, 50711, 50713, 50714, 50717
 COLOUR_MATRIX_1, COLOUR_MATRIX_2, AS_SHOT_NEUTRAL, PRIVATE_DATA = 50721, 50722, 50728, 50740
+CALIBRATION_1, CALIBRATION_2, ANALOG_BALANCE = 50723, 50724, 50727
+CALIBRATION_SIGNATURE, PROFILE_SIGNATURE = 50931, 50932
 LINEARIZATION, BLACK_DELTA_H, BLACK_DELTA_V, OPCODES_1 = 50712, 50715, 50716, 51008
 ILLUMINANT_1, ILLUMINANT_2, NOISE_PROFILE, ACTIVE_AREA = 50778, 50779, 51041, 50829
 
@@ -228,12 +230,22 @@ def linearization(tags: Tags) -> np.ndarray | None:
 
 
 def d65_matrix(tags: Tags) -> np.ndarray | None:
-    """(3, 3) XYZ -> camera matrix of the illuminant nearest to D65 that `tags` offer one for, else None."""
-    first = (_number(tags, ILLUMINANT_1, D65), _numbers(tags, COLOUR_MATRIX_1))
-    second = (_number(tags, ILLUMINANT_2, 0), _numbers(tags, COLOUR_MATRIX_2))
-    for _, numbers in sorted((first, second), key=lambda pair: _mired_from_d65(pair[0])):
+    """(3, 3) XYZ -> camera matrix of the illuminant nearest to D65 that `tags` offer one for, else None.
+
+    AnalogBalance CameraCalibration ColorMatrix: that of the model, and what this unit of it differs by (DNG
+    1.7.1, chapter 6; a calibration counts where its signature is that of the profile).
+    """
+    first = (_number(tags, ILLUMINANT_1, D65), COLOUR_MATRIX_1, CALIBRATION_1)
+    second = (_number(tags, ILLUMINANT_2, 0), COLOUR_MATRIX_2, CALIBRATION_2)
+    for _, matrix, calibration in sorted((first, second), key=lambda light: _mired_from_d65(light[0])):
+        numbers, of_unit = _numbers(tags, matrix), _numbers(tags, calibration)
         if len(numbers) == 9:
-            return np.reshape(numbers, (3, 3))
+            found = np.reshape(numbers, (3, 3))
+            signatures = (_text(tags, code) for code in (CALIBRATION_SIGNATURE, PROFILE_SIGNATURE))
+            if len(of_unit) == 9 and len(set(signatures)) == 1:
+                found = np.reshape(of_unit, (3, 3)) @ found
+            balance = _numbers(tags, ANALOG_BALANCE)
+            return np.diag(balance) @ found if len(balance) == 3 else found
     return None
 
 
