@@ -484,7 +484,34 @@ def test_sites_of_other_black_levels_are_measured_stated_and_kept(tmp_path, rng)
         within(fit.sigma2_dn, np.array(truth.sigma2) * 963**2, fit.sigma2_dn_error)
         assert found.profile.black_level == 65
         np.testing.assert_allclose(found.profile.measured.black[0], levels, atol=0.1)
-        assert any("sites differ" in note for note in found.notes)
+        assert any("--black-level 60,66,64,70" in note for note in found.notes)
+
+
+def simulated(folder: Path, rng, light_dn, *, black: float, read_dn: float, k_dn: float, step: int = 1):
+    """Twelve frames of white noise that are multiples of `step`."""
+    sigma = np.sqrt(read_dn**2 + k_dn * light_dn)
+    noises = rng.standard_normal((12, *light_dn.shape))
+    return write_arrays(
+        folder, [step * np.rint(black + light_dn + sigma * z).astype(np.uint16) for z in noises]
+    )
+
+
+@pytest.mark.parametrize(("black", "noted"), [(63.5, True), (64.0, False)])
+def test_a_black_level_between_two_integers_is_noted(tmp_path, rng, black, noted):
+    noise = {"black": black, "read_dn": 2.0, "k_dn": 0.5}
+    lit, dark = (simulated(tmp_path / str(x), rng, x * scene().mosaic, **noise) for x in (500, 0))
+    notes = calibrate(lit, name="x", dark=dark, layout=replace(LAYOUT, black_level=None)).notes
+    assert any(note.endswith("--black-level 63.5") for note in notes) == noted
+
+
+@pytest.mark.parametrize(("read_dn", "noted"), [(0.2, True), (2.0, False)])
+def test_integers_with_gaps_wider_than_the_noise_are_noted(tmp_path, rng, read_dn, noted):
+    """12 bits as the upper ones of 16, as PNG files have them."""
+    noise = {"black": 256, "read_dn": read_dn, "k_dn": 0.5, "step": 16}
+    lit, dark = (simulated(tmp_path / str(x), rng, x * scene().mosaic, **noise) for x in (900, 0))
+    layout = Layout(iso=800, cfa=PROFILE.cfa, white_level=65520)
+    notes = calibrate(lit, name="x", dark=dark, layout=layout).notes
+    assert any("multiples of 16" in note for note in notes) == noted
 
 
 def test_what_levels_contradict_is_refused(tmp_path, rng):
@@ -508,6 +535,16 @@ def test_raw_files_without_an_iso_are_noted_as_iso_100(tmp_path, rng):
     assert any("no ISO known" in note for note in found.notes)
     save_profile(tmp_path / "mine.yaml", found.profile)
     assert "noted as ISO 100" in load_profile(tmp_path / "mine.yaml").notes
+
+
+def test_dark_frames_without_an_iso_are_of_that_of_the_others(tmp_path, rng):
+    """A path that names a chart, ISO 12233, names no ISO."""
+    noise = {"black": 64, "read_dn": 2.0, "k_dn": 0.5}
+    lit = simulated(tmp_path / "iso400" / "iso12233", rng, 500 * scene().mosaic, **noise)
+    dark = simulated(tmp_path / "covered", rng, 0 * scene().mosaic, **noise)
+    found = calibrate(lit, name="x", dark=dark, layout=replace(LAYOUT, iso=None, black_level=None))
+    assert found.profile.iso == (400,)
+    assert any("12 frames" in note and "ISO 400, that of the others" in note for note in found.notes)
 
 
 def test_mosaics_without_a_pattern_are_noted_as_those_of_no_filters(tmp_path, rng):

@@ -47,6 +47,7 @@ BELOW_BLACK = 0.01  # of the pixels that may have a mean as far below the black 
 SITES_APART_SIGMA = 0.05  # of the read noise, below which nobody sees the cast
 UNCERTAIN = 0.02  # relative standard error of k that deserves a note
 SIGMA2_UNCERTAIN = 0.2  # of sigma2, which hardly shows in bright pictures
+UNRESOLVED = 0.5  # squared steps of the integers, the read noise below which their gaps hide it
 CROOKED = 0.1  # relative departure of the samples from their line that does
 
 Progress = Callable[[int, int], None]
@@ -126,8 +127,8 @@ class _Reader:
             if self.found.camera.bare:
                 alone = f"light, {burst[0].level:.1f} DN on the mean, unlike the file before it"
             raise FsidError(
-                f"{burst[0].path}: the only frame of its {alone}; a burst needs the same picture "
-                f"several times: add frames or leave it out"
+                f"{burst[0].path}: the only frame of its {alone}; a burst needs the same picture several "
+                f"times: add frames, give those of one exposure one after the other, or leave it out"
             )
         stats = TemporalStatistics(self.found.camera.white_level, dark=dark and self.terms)
         for frame in burst:
@@ -295,9 +296,20 @@ def _notes(reader: _Reader, isos: Sequence[float], fits: Sequence[NoiseFit]) -> 
         yield f"{path}: dark frames have a mean of {measured:.1f} DN, {source} is {stated}, which is kept"
     sigma2_dn = np.array([fit.sigma2_dn for fit in fits])
     black = site_blacks(np.array([fit.black for fit in fits]), sigma2_dn)
-    if reader.found.camera.bare and np.ptp(black) > apart_dn(sigma2_dn):
-        levels = ",".join(f"{round(level, 1):g}" for level in black.tolist())
-        yield f"the black levels of the sites differ: denoise such mosaics with --black-level {levels}"
+    off_dn = float(np.abs(black - round(float(black.mean()))).max())
+    if reader.found.camera.bare and max(np.ptp(black), 2 * off_dn) > apart_dn(sigma2_dn):
+        rounded = [f"{round(level, 1):g}" for level in black.tolist()]
+        levels = ",".join(rounded if len(set(rounded)) > 1 else rounded[:1])
+        yield (
+            f"the black level is {levels} and not one whole number: denoise such mosaics with --black-level "
+            f"{levels}"
+        )
+    step_dn = reader.found.step_dn
+    if step_dn > 1 and sigma2_dn.min() < UNRESOLVED * step_dn**2:
+        yield (
+            f"all DN are multiples of {step_dn}, and read noise is hardly larger: sigma2 and the errors are "
+            f"wrong; give the integers, and the levels, divided by {step_dn}"
+        )
     for iso in sorted(set(reader.cut_off)):
         yield f"ISO {iso:g}: dark noise reaches DN 0 and is cut off; corrected as far as it is Gaussian"
     for iso, fit in zip(isos, fits, strict=True):

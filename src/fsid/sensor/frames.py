@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from fsid.errors import FsidError
+from fsid.plurals import counted
 from fsid.sensor.bare import BARE_SUFFIXES, Layout, check_bayer, check_white, read_dn
 from fsid.sensor.black_levels import BlackLevels
 from fsid.sensor.camera_profile import MONO
@@ -83,13 +84,17 @@ class Frame:
 
 @dataclass(frozen=True)
 class FrameSet:
-    """The frames and dark frames of one camera. date: of the first frame, "" where unknown."""
+    """The frames and dark frames of one camera. date: of the first frame, "" where unknown.
+
+    step_dn: all integers are multiples of it: 16 where 12 bits are the upper ones of 16.
+    """
 
     camera: Camera
     frames: tuple[Frame, ...]
     dark: tuple[Frame, ...]
     date: str
     notes: tuple[str, ...]
+    step_dn: int = 1
 
     def read(self, frame: Frame, layout: Layout) -> np.ndarray:
         """DN (H, W) of `frame`; FsidError where it is of another camera or another mode.
@@ -211,7 +216,12 @@ def _raw_frames(paths: Sequence[Path], dark: Sequence[Path], layout: Layout) -> 
 
     frames, notes = _with_iso([frame(path) for path in (*paths, *dark)], layout.iso)
     return FrameSet(
-        camera, tuple(frames[: len(paths)]), tuple(frames[len(paths) :]), headers[paths[0]].date, notes
+        camera,
+        tuple(frames[: len(paths)]),
+        tuple(frames[len(paths) :]),
+        headers[paths[0]].date,
+        notes,
+        _step_dn(first.dn),
     )
 
 
@@ -221,7 +231,7 @@ def _bare_frames(paths: Sequence[Path], dark: Sequence[Path], layout: Layout) ->
     black = None if levels is None else BlackLevels.stated(levels, cfa, "--black-level")
     level = None if black is None else round(black.mean())
     frames: list[Frame] = []
-    highest, shape = 0, ()
+    highest, shape, step_dn = 0, (), 0
     for number, path in enumerate((*paths, *dark)):
         dn = read_dn(path, cfa=cfa, width=layout.width, height=layout.height)
         if shape not in ((), dn.shape):
@@ -232,7 +242,7 @@ def _bare_frames(paths: Sequence[Path], dark: Sequence[Path], layout: Layout) ->
                 _check_mono(path, dn)
         if layout.white_level is not None:
             check_white(dn, level or 0, layout.white_level, path)
-        shape, highest = dn.shape, max(highest, int(dn.max()))
+        shape, highest, step_dn = dn.shape, max(highest, int(dn.max())), math.gcd(step_dn, _step_dn(dn))
         mean_dn, noise_dn = float(dn.mean()), _noise_dn(dn) if number >= len(paths) else 0.0
         same_dn = max(SAME_LIGHT * mean_dn, SAME_DN, SAME_DARK * noise_dn)
         frames.append(Frame(path, _iso_in(path), 0.0, mean_dn, same_dn))
@@ -249,23 +259,31 @@ def _bare_frames(paths: Sequence[Path], dark: Sequence[Path], layout: Layout) ->
     for stated in (0.0,) if black is None else (black.tile.min(), black.tile.max()):
         check_levels(stated, white, str(paths[0]))
     camera = Camera("", cfa, level, white, bare=True, shape=shape, black=black)
-    return FrameSet(camera, tuple(frames[: len(paths)]), tuple(frames[len(paths) :]), "", (*notes, *assumed))
+    found, notes = tuple(frames), [*notes, *assumed]
+    return FrameSet(camera, found[: len(paths)], found[len(paths) :], "", tuple(notes), max(step_dn, 1))
 
 
 def _with_iso(frames: list[Frame], given: float | None) -> tuple[list[Frame], tuple[str, ...]]:
-    """The frames with the ISO that is `given`, else 100 where they state none; a note where it is not theirs.
+    """The frames with the ISO that is `given`, else that of the others where they have one, else 100 where
+    they state none; a note where it is not theirs.
 
     FsidError where one ISO is given for frames that state several.
     """
-    if given is None:
-        if all(frame.iso > 0 for frame in frames):
-            return frames, ()
-        known = [frame if frame.iso > 0 else replace(frame, iso=100.0) for frame in frames]
-        return known, ("no ISO known, noted as ISO 100; --iso states it",)
     stated: dict[float, Path] = {}
     for frame in frames:
         if frame.iso > 0:
             stated.setdefault(frame.iso, frame.path)
+    if given is None:
+        unknown = [frame.path for frame in frames if not frame.iso > 0]
+        if not unknown:
+            return frames, ()
+        iso = next(iter(stated)) if len(stated) == 1 else 100.0
+        known = [frame if frame.iso > 0 else replace(frame, iso=iso) for frame in frames]
+        if not stated:
+            return known, ("no ISO known, noted as ISO 100; --iso states it",)
+        whose = "that of the others" if len(stated) == 1 else "theirs is unknown"
+        first = f"{counted(len(unknown), 'frame')}, the first one {unknown[0]}"
+        return known, (f"{first}: taken for ISO {iso:g}, {whose}; name it in the path or give --iso",)
     if len(stated) > 1:
         (one, path), (two, other), *_ = stated.items()
         raise FsidError(
@@ -277,8 +295,8 @@ def _with_iso(frames: list[Frame], given: float | None) -> tuple[list[Frame], tu
 
 
 def _iso_in(path: Path) -> float:
-    """The last ISO in a path, 0 where there is none."""
-    named = _ISO_IN_PATH.findall(path.as_posix())
+    """The last ISO in a path, 0 where there is none; ISO 12233 is a chart."""
+    named = [number for number in _ISO_IN_PATH.findall(path.as_posix()) if number != "12233"]
     return float(named[-1]) if named else 0.0
 
 
@@ -286,6 +304,11 @@ def _noise_dn(dn: np.ndarray) -> float:
     """Standard deviation of a pixel of an even picture, from neighbours of the same site in its row."""
     steps = np.abs(dn[:, 2:].astype(np.int32) - dn[:, :-2])
     return float(np.median(steps)) / (GAUSS_MAD * np.sqrt(2)) if steps.size else 0.0
+
+
+def _step_dn(dn: np.ndarray) -> int:
+    """The largest number that all integers of `dn` are multiples of; 0 of zeros."""
+    return int(np.gcd.reduce(dn, axis=None))
 
 
 def _check_mono(path: Path, dn: np.ndarray) -> None:
