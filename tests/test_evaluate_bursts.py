@@ -467,6 +467,20 @@ def test_black_levels_and_times_that_phones_measure_anew_are_those_of_one_burst(
     assert average(paths[1:], paths[0])[1].frames == FRAMES - 1
 
 
+def test_what_a_file_states_is_checked_before_a_burst_is_averaged(clean: Raw, tmp_path: Path, monkeypatch):
+    """Averaging takes minutes, and what is finished is lost with the rest."""
+    monkeypatch.setattr("fsid.evaluate.bursts.average", lambda *of: pytest.fail("was averaged"))
+    for scene in ("a", "b"):
+        paths = _burst(tmp_path / "captures" / scene / "1lux", clean)
+    write_dng(paths[0], replace(read_raw(paths[0]), noise=NoiseLevel((-1.0,) * 4, (1e-4,) * 4)))
+    with pytest.raises(FsidError, match=f"{paths[0]}.*below 0"):
+        burst_testset(tmp_path / "captures", tmp_path / "set")
+    write_dng(paths[0], replace(read_raw(paths[0]), noise=None))
+    write_dng(paths[3], replace(read_raw(paths[3]), iso=800.0))
+    with pytest.raises(FsidError, match=f"{paths[3]}: ISO 800"):
+        burst_testset(tmp_path / "captures", tmp_path / "set")
+
+
 def test_bursts_of_two_cameras_are_no_test_set(clean: Raw, tmp_path: Path, refused):
     """The set states one camera, and results name it: the second one's would be taken for its."""
     captures = tmp_path / "captures"

@@ -148,6 +148,11 @@ def _check_alike(path: Path, raw: Raw, first: Raw) -> None:
     ours_s, theirs_s = raw.metadata.exposure_s, first.metadata.exposure_s
     if ours_s and theirs_s and abs(ours_s / theirs_s - 1) > MAX_FLICKER:
         stated.append(("exposure time in s", ours_s, theirs_s))
+    check_setting(path, stated)
+
+
+def check_setting(path: Path, stated: Sequence[tuple[str, str | float, str | float]]) -> None:
+    """FsidError where a frame states something else than the first one; stated: (what, frame, first)."""
     for what, ours, theirs in stated:
         if ours != theirs:
             ours, theirs = (f"{v:.6g}" if isinstance(v, float) else v for v in (ours, theirs))

@@ -17,7 +17,7 @@ from dataclasses import asdict, fields, replace
 from pathlib import Path
 
 from fsid.errors import FsidError
-from fsid.evaluate.alignment import LEAST_FRAMES, align, read_first
+from fsid.evaluate.alignment import LEAST_FRAMES, align, check_setting, read_first
 from fsid.evaluate.burst_truth import TruthQuality, average, cut
 from fsid.evaluate.testset import Progress, TestImage, TestSet, staged, write_testset
 from fsid.files import write_atomically
@@ -63,7 +63,7 @@ def burst_testset(
     for scene in scenes:
         if missing := [level for level in levels if (scene, level) not in bursts]:
             raise FsidError(f"{captures / scene}: has no burst {missing[0]}; every scene needs every level")
-    _check_one_camera([paths[0] for paths in bursts.values()])
+    _check_stated(list(bursts.values()), camera)
     qualities = []
     name = load_profile(camera).name if camera else ""
     images = tuple(TestImage(scene, scene) for scene in scenes)
@@ -110,14 +110,20 @@ def _find_bursts(captures: Path, frames: int) -> dict[tuple[str, str], list[Path
     return found
 
 
-def _check_one_camera(paths: Sequence[Path]) -> None:
-    """FsidError where bursts, of which these are the first frames, are of several cameras."""
-    name = read_header(paths[0]).camera
-    for path in paths:
-        if (other := read_header(path).camera) != name:
+def _check_stated(bursts: Sequence[Sequence[Path]], camera: str | Path) -> None:
+    """Before the first burst is averaged, which takes minutes: FsidError where files are of several cameras,
+    those of a burst of several ISOs, or the noise of its first frame cannot be told."""
+    name = read_header(bursts[0][0]).camera
+    for paths in bursts:
+        first, *others = (read_header(path) for path in paths)
+        if first.camera != name:
             raise FsidError(
-                f"{path}: is from camera {other!r}, {paths[0]} from {name!r}; a test set is of one camera"
+                f"{paths[0]}: is from camera {first.camera!r}, {bursts[0][0]} from {name!r}; "
+                "a test set is of one camera"
             )
+        for path, header in zip(paths[1:], others, strict=True):
+            check_setting(path, [("camera", header.camera, name), ("ISO", header.iso, first.iso)])
+        _noise(read_raw(paths[0]), camera, paths[0])
 
 
 def _folders(folder: Path) -> list[Path]:
