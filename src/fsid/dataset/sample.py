@@ -30,8 +30,10 @@ _SAME_NOISE = 1e-6  # relative: a machine may round otherwise
 
 
 def make_sample(config: GenerateConfig, seed: int, index: int, renderer: SceneRenderer | None) -> Sample:
-    """Sample `index` of the dataset (`config`, `seed`), as `fsid generate` makes it.
+    """Sample `index` of the dataset (`config`, `seed`), as `fsid generate` first draws it.
 
+    One that the finished dataset drew again, because it looks like an earlier one, is what `remake` makes of
+    its JSON.
     renderer: that of `rendering(config)`, whose settings are the configuration's; other ones make another
     picture. None where `config.images` names a folder of pictures. FsidError as in `make_frame`.
     """
