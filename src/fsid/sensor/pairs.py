@@ -94,8 +94,8 @@ def noisy_from_clean(
 ) -> Raw:
     """One stored exposure of `clean` at `level`: noise, then the camera's own rounding and clipping.
 
-    clean: with the camera's levels, to which it is rounded; those of a clean DNG are 64 times finer. Where
-    the terms leave out rounding, the result has these finer levels, and a file does not round it either.
+    clean: with the camera's levels, to which it is rounded; those of a clean DNG are finer, see
+    `clean_levels`. Where the terms leave out rounding, the result has these, and a file hardly rounds it.
     terms, unit, exposure_s: what the camera does beyond the paper's model; see `terms`.
     """
     check_kind(rng, np.random.Generator, _GENERATOR)

@@ -53,7 +53,7 @@ def quantise(raw: Raw) -> Raw:
 def clean_levels(raw: Raw) -> Raw:
     """The same image with levels scaled by the largest power of two that 16 bits hold (64..1023: by 64).
 
-    A clean image stored with them is rounded to 1/64 of the camera's DN, which is far below its noise.
+    A clean image stored with them is rounded to that part of the camera's DN, which is far below its noise.
     FsidError for a black level below 0.
     """
     if raw.black_level < 0:
