@@ -1,5 +1,6 @@
 """Settings: overlays apply in order, and every mistake is one line that names the key."""
 
+import re
 from collections.abc import Iterator
 from dataclasses import MISSING, dataclass, field, fields, replace
 from pathlib import Path
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 from fsid.config import Override, from_plain, given_keys, load_settings, save_settings
-from fsid.dataset import GenerateConfig, Workforce
+from fsid.dataset import DatasetConfig, GenerateConfig, Workforce
 from fsid.errors import FsidError
 from fsid.scene import SceneConfig
 from fsid.sensor import NoiseTerms
@@ -22,7 +23,9 @@ class Inner:
 
     def __post_init__(self) -> None:
         if self.rate < 0:
-            raise FsidError("inner.rate: must not be negative")
+            raise FsidError("rate: must not be negative")
+        if not (self.rate or self.names):
+            raise FsidError("give names or a rate")
 
 
 @dataclass(frozen=True)
@@ -218,6 +221,29 @@ def test_the_advice_for_a_list_is_one_of_the_right_length():
         load_settings(Outer, None, ["size_m=5"])
     advice = str(caught.value).rpartition(" ")[2]
     assert load_settings(Outer, None, [f"size_m={advice}"]).size_m == (5.0, 5.0)
+
+
+def test_a_value_that_its_group_refuses_is_named_by_its_whole_key(tmp_path: Path):
+    file = tmp_path / "mine.yaml"
+    file.write_text("scene: {background: {tile_scale: [9, 1]}}")
+    with pytest.raises(FsidError, match=r"mine\.yaml: scene\.background\.tile_scale = \(9\.0, 1\.0\): give"):
+        load_settings(GenerateConfig, file)
+    for override, line in (
+        ("scene.materials.tile_scale=[9,1]", "scene.materials.tile_scale = (9.0, 1.0): give two numbers"),
+        ("scene.mesh_families=[mugg]", "scene.mesh_families: 'mugg' does not exist"),
+        ("checks.black_share=2", "checks.black_share: 2.0 is not between"),
+        ("width=3", "width: 3 is not an even"),
+    ):
+        with pytest.raises(FsidError, match=f"^--set: {re.escape(line)}"):
+            load_settings(GenerateConfig, None, [override])
+    dataset = {"seed": 0, "shard_size": 1, "generate": {"checks": {"duplicate_bits": 999}}}
+    with pytest.raises(FsidError, match=r"^x: generate\.checks\.duplicate_bits: 999 is not"):
+        from_plain(DatasetConfig, dataset, source="x")
+
+
+def test_what_is_said_of_no_single_key_comes_after_its_group():
+    with pytest.raises(FsidError, match=r"^--set: inner: give names or a rate$"):
+        load_settings(Outer, None, ["inner={rate: 0, names: []}"])
 
 
 def test_given_keys_are_single_settings_also_inside_of_groups():

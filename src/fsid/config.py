@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
 from importlib.resources import as_file, files
@@ -20,6 +21,7 @@ from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 import cattrs
 import numpy as np
 import yaml
+from cattrs import AttributeValidationNote
 
 from fsid.errors import FsidError
 from fsid.files import write_atomically
@@ -140,8 +142,7 @@ def from_plain(kind: type[T], plain: Any, *, source: str) -> T:
     try:
         return _CONVERTER.structure(plain, kind)
     except cattrs.BaseValidationError as error:
-        refusal = _first_refusal(error)
-        raise FsidError(f"{source}: {refusal or _first_reason(error)}") from None
+        raise FsidError(f"{source}: {_first_refusal(error) or _first_reason(error)}") from None
 
 
 def _first_reason(error: cattrs.BaseValidationError) -> str:
@@ -158,13 +159,23 @@ def _reason(error: BaseException, kind: type | None) -> str:
     return str(error) if isinstance(error, ValueError) else f"expected {getattr(kind, '__name__', kind)}"
 
 
-def _first_refusal(error: BaseException) -> FsidError | None:
-    if isinstance(error, FsidError):
-        return error
+def _first_refusal(error: BaseException, path: str = "") -> str:
+    """What the first dataclass that refuses its values says, after the path to it; "" where none does."""
     for inner in getattr(error, "exceptions", ()):
-        if found := _first_refusal(inner):
+        notes = getattr(inner, "__notes__", ())
+        keys = (note.name for note in notes if isinstance(note, AttributeValidationNote))
+        place = ".".join(filter(None, (path, *keys)))
+        if isinstance(inner, FsidError):
+            return f"{place}{_joint(str(inner), getattr(error, 'cl', None))}{inner}" if place else str(inner)
+        if found := _first_refusal(inner, place):
             return found
-    return None
+    return ""
+
+
+def _joint(message: str, made: Any) -> str:
+    """What goes between the path to a dataclass and its message, which most often begins with a key of it."""
+    names = {field.name for field in dataclasses.fields(made)} if dataclasses.is_dataclass(made) else ()
+    return "." if re.split(r"\W", message, maxsplit=1)[0] in names else ": "
 
 
 def load_settings(

@@ -47,9 +47,9 @@ class Checks:
         check_fields(self)
         for key in ("black_share", "blown_share"):
             if not 0 <= getattr(self, key) <= 1:
-                raise FsidError(f"checks.{key}: {getattr(self, key)} is not between 0 and 1")
+                raise FsidError(f"{key}: {getattr(self, key)} is not between 0 and 1")
         if not -1 <= self.duplicate_bits <= 256:
-            raise FsidError(f"checks.duplicate_bits: {self.duplicate_bits} is not between -1 and 256")
+            raise FsidError(f"duplicate_bits: {self.duplicate_bits} is not between -1 and 256")
 
 
 @dataclass(frozen=True)
