@@ -295,6 +295,7 @@ def test_normal_and_id_of_a_sphere(renderer: Renderer) -> None:
     missed = np.isnan(expected[..., 2])
     assert (frame.object_id[missed] == -1).all()
     assert np.isinf(frame.depth[missed]).all()
+    assert (frame.normal[np.isinf(frame.depth)] == (0, 0, 1)).all()
 
 
 def test_normals_face_the_viewer(renderer: Renderer) -> None:

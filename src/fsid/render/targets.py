@@ -225,6 +225,7 @@ class Targets:
             for rows, texels in self._strips(2, "nu2", np.uint16):
                 _fill(normal[rows], texels, 2 / _ID_LEVELS)
                 normal[rows] -= 1
+            normal[np.isinf(depth)] = (0, 0, 1)  # its zeros lie between two integers
         return Frame(radiance, albedo, normal, depth, object_id)
 
     def _strips(self, image: int, dtype: str, kind: type) -> Iterator[tuple[slice, np.ndarray]]:
