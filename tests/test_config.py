@@ -120,6 +120,8 @@ def test_settings_made_in_python_are_saved(tmp_path: Path):
         ("count", "count"),
         ("count=[", "count"),
         ("count=2001-99-99", "count"),
+        ("count=010", "count: is not valid YAML (010 begins with a zero; write the number without"),
+        ("size_m=[-01, 2]", "size_m: is not valid YAML (-01 begins with a zero"),
         ("count=!!bool foo", "count"),
         pytest.param(f"count={'9' * 5000}", "count", id="too-many-digits"),
     ],

@@ -1,12 +1,14 @@
 """YAML and JSON as plain values, loaded safely: a file may come from anywhere.
 
-A key that a YAML text gives twice is an error, and so are aliases that stand for more than memory holds.
+A key that a YAML text gives twice is an error, and so are a whole number that begins with a zero and aliases
+that stand for more than memory holds.
 """
 
 from __future__ import annotations
 
 import json
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -63,6 +65,13 @@ def parse_json(data: bytes | str, source: str) -> Any:
 class _Loader(yaml.SafeLoader):
     _composed = 0
 
+    def construct_yaml_int(self, node: yaml.ScalarNode) -> int:
+        """YAML 1.1 takes 010 for 8, and nobody means that; YAML 1.2 takes it for 10."""
+        if re.fullmatch(r"[-+]?0[0-9_]+", node.value):
+            problem = f"{node.value} begins with a zero; write the number without, a text in quotes"
+            raise yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark)
+        return super().construct_yaml_int(node)
+
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
         self._composed += 1
         if self._composed > _MOST_NODES:  # which take about a kilobyte each
@@ -86,6 +95,9 @@ class _Loader(yaml.SafeLoader):
                     )
                 seen.add((key.tag, key.value))
         return node
+
+
+_Loader.add_constructor("tag:yaml.org,2002:int", _Loader.construct_yaml_int)
 
 
 def _nodes(node: yaml.Node, known: dict[int, float]) -> float:
