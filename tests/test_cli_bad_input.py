@@ -35,6 +35,8 @@ def folder(tmp_path: Path) -> Path:
 
 CASES = [
     ("generate {0}/out --count 0", "--count"),
+    ("generate {0}/out --count 99999999999999999999", "--count 99999999999999999999: at most 100,000,000"),
+    ("generate {0}/out --count 100000001 --dry-run", "--count 100000001: at most 100,000,000"),
     ("generate {0}/out --count 1 --width 33", "width"),
     ("generate {0}/out --count 1 --set no_such_key=1", "no_such_key"),
     ("generate {0}/out --count 1 --set cameras=[nokia]", "nokia"),

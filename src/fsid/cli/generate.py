@@ -90,6 +90,7 @@ def generate(
     from fsid.config import given_keys
     from fsid.dataset import (
         Workforce,
+        check_count,
         check_given,
         check_settings,
         dataset_config,
@@ -121,8 +122,9 @@ def generate(
         for path in make_only(out, only, stated, seed, note=note):
             console.print(str(path), soft_wrap=True, markup=False)
         return
-    if count is None or count < 1:
-        raise FsidError("--count: say how many pairs the dataset is to have, at least 1")
+    if count is None:
+        raise FsidError("--count: say how many pairs the dataset is to have")
+    check_count(count)
     seed = seed or 0
     workforce = Workforce(workers, ray, workers_per_gpu)
     check_settings(settings)  # before a library is read

@@ -32,6 +32,9 @@ from fsid.files import held, stamp
 SAMPLES_PER_WORKER = 320
 """After so many a worker is replaced, so that whatever a driver leaks stays small."""
 
+_MOST_PAIRS = 100_000_000
+"""Keys have eight digits, and shards that are missing are listed, half a gigabyte for so many."""
+
 DEAD_AFTER_S = 86400
 """Where there are no locks, a file that was not written to for so long is of a process that died."""
 
@@ -126,9 +129,7 @@ def generate(
     Raises FsidError where `out` already holds a dataset of another configuration or seed, where another
     process fills it, where the disk refuses, or where a shard kills its worker again and again.
     """
-    count = whole(count, "count")
-    if count < 1:
-        raise FsidError(f"--count {count}: must be at least 1")
+    count = check_count(count)
     out, workforce = Path(out), workforce or Workforce(workers)
     dataset = dataset_config(config, seed, shard_size)
     with _locked(out):
@@ -159,6 +160,16 @@ def generate(
     return total
 
 
+def check_count(count: int) -> int:
+    """`count` as a whole number; FsidError unless a dataset may have so many pairs."""
+    count = whole(count, "count")
+    if count < 1:
+        raise FsidError(f"--count {count}: must be at least 1")
+    if count > _MOST_PAIRS:
+        raise FsidError(f"--count {count}: at most {_MOST_PAIRS:,}; make several datasets, of a seed each")
+    return count
+
+
 def pairs_to_make(
     out: str | Path,
     dataset: DatasetConfig,
@@ -167,9 +178,9 @@ def pairs_to_make(
 ) -> tuple[int, int]:
     """How many of the first `count` pairs `out` lacks, in whole frames, and in how many shards they are.
 
-    looking: as of `generate`. FsidError where it holds others.
+    looking: as of `generate`. FsidError where it holds others, and for a count as there.
     """
-    out = Path(out)
+    out, count = Path(out), check_count(count)
     _check_own(out, dataset)
     missing = list(_missing(out, dataset, count, looking))
     if missing:
