@@ -77,6 +77,16 @@ CASES = [
     ("generate {0}/out --only {0}/a.json --count 1", "a.json: the file says all"),
     ("generate {0}/out --only {0}/a.json --seed 0", "a.json: the file says all"),
     ("generate {0}/out --only {0}/a.json --width 64", "a.json: the file says all"),
+    *(
+        (f"generate {{0}}/out --only {key} {option}", f"{option.split()[0]}: is of a dataset")
+        for key, option in (
+            ("3", "--count 4"),
+            ("3", "--count 1"),
+            ("3", "--workers 2"),
+            ("3", "--ray local"),
+            ("{0}/a.json", "--workers-per-gpu 1"),
+        )
+    ),
     (
         "generate {0}/out --count 1 --set scene.hdri_share=1",
         "hdri_share: has no effect while scene.hdri",

@@ -115,6 +115,11 @@ def generate(
         raise FsidError("--dry-run: says what a dataset takes, not one sample; leave out --only")
     if only.endswith(".json") and (config or given or (count, seed) != (None, None)):
         raise FsidError(f"--only {only}: the file says all of it; leave out --count, --seed and settings")
+    if only:
+        of_many = {"count": count, "workers": workers - 1, "ray": ray, "workers-per-gpu": workers_per_gpu}
+        for option, value in of_many.items():
+            if value not in (None, 0, ""):
+                raise FsidError(f"--{option}: is of a dataset, and --only makes one pair; leave it out")
     settings = generate_config(config, given)
     check_given(settings, given_keys(given))
     if only:
