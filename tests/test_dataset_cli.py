@@ -11,6 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import OpenEXR
 import pytest
 from PIL import Image
 
@@ -191,7 +192,7 @@ def test_pictures_of_formats_that_are_not_read_are_counted(
     (folder := tmp_path / "photos").mkdir()
     for name in ("a.HEIC", "b.heic", "c.gif", "._d.avif"):
         (folder / name).touch()
-    told = "left out are 1 .gif, 2 .heic, which FSID does not read: save them as .png or .jpg"
+    told = "left out are 1 .gif, 2 .heic, which are not read here: save them as .png or .jpg"
     command = ["generate", tmp_path / "out", "--images", folder, "--count", "1", "--quiet"]
     for refusal in (refused(*command), refused("testset", "photos", folder, "-o", tmp_path / "set")):
         assert f"; {told}" in refusal
@@ -202,6 +203,30 @@ def test_pictures_of_formats_that_are_not_read_are_counted(
     main(["testset", "photos", str(folder), "-o", str(tmp_path / "set"), "--iso", "800", "--quiet"])
     main(["inspect", str(folder), "--quiet"])
     assert capsys.readouterr().err.count(f"note: {folder}: {told}\n") == 2
+
+
+def test_renders_and_raw_files_beside_photographs_are_counted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of those in the folder of a dataset nothing is said: loose pairs and its contact sheet lie there."""
+    (folder := tmp_path / "photos").mkdir()
+    noise = np.random.default_rng(0).integers(0, 255, (64, 64, 3), np.uint8)
+    Image.fromarray(noise).save(folder / "a.png")
+    channels = {name: np.float32(noise[..., i] / 255) for i, name in enumerate("RGB")}
+    OpenEXR.File({"type": OpenEXR.scanlineimage}, channels).write(str(folder / "b.exr"))
+    for name in ("c.NEF", "d.dng", "e.txt"):
+        (folder / name).touch()
+    size, read = ["--width", "32", "--height", "32", "--quiet"], "not read here: save them as .png or .jpg"
+    main(["testset", "photos", str(folder), "-o", str(tmp_path / "set"), "--iso", "800", "--quiet"])
+    assert (
+        f"note: {folder}: left out are 1 .dng, 1 .exr, 1 .nef, which are {read}\n" == capsys.readouterr().err
+    )
+    out = tmp_path / "data"
+    main(["generate", str(out), "--images", str(folder), "--count", "2", *size])
+    assert f"note: {folder}: left out are 1 .dng, 1 .nef, which are {read}\n" == capsys.readouterr().err
+    main(["generate", str(out), "--only", "0", "--quiet"])
+    main(["inspect", str(out), "--quiet"])
+    assert "left out" not in capsys.readouterr().err
 
 
 def test_folders_are_surveyed_once_and_workers_are_told(

@@ -81,7 +81,8 @@ def experiment(
     given |= {"photos": str(photos.resolve()) if photos else ("" if kind == "real-vs-synthetic" else None)}
     given |= {"tests": tuple(str(folder.resolve()) for folder in test)}
     config = replace(scale_config(kind, scale), **{k: v for k, v in given.items() if v is not None})
-    note_unread((*test, photos))
+    note_unread(test)
+    note_unread((photos,), renders=True)
     report = run_experiment(output, config, partial(progress_bar, quiet=quiet), workers=workers, note=note)
     rows = json.loads((output / "results.json").read_text(encoding="utf-8"))
     console = Terminal(stderr=True, quiet=quiet, markup=False)

@@ -134,7 +134,7 @@ def generate(
     workforce = Workforce(workers, ray, workers_per_gpu)
     check_settings(settings)  # before a library is read
     note_extrapolation(settings.cameras, *settings.iso_range)
-    note_unread((settings.images,))
+    note_unread((settings.images,), renders=True)
     if not settings.images:
         read_libraries(settings.scene, quiet=quiet)
     dataset = dataset_config(settings, seed)

@@ -18,14 +18,17 @@ from fsid.dataset.photo_values import srgb_values
 from fsid.errors import FsidError
 from fsid.files import check_file
 from fsid.sensor import upright
+from fsid.sensor.frames import RAW_SUFFIXES
 
 SMALLEST_PX = 32
 _BLACK = 0.02  # sRGB-encoded; a photograph that is darker everywhere shows nothing
 PHOTO_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".bmp")
 _FORMATS = ("PNG", "JPEG", "TIFF", "WEBP", "BMP")
 """Whatever a file is called: others Pillow may hand to programs of their own, PostScript to Ghostscript."""
-_OTHER_SUFFIXES = (".heic", ".heif", ".avif", ".gif", ".jxl", ".jp2")
-"""Of pictures that nothing here reads."""
+EXR_SUFFIX = ".exr"
+"""Of renders, which some take for pictures, too."""
+_OTHER_SUFFIXES = (".heic", ".heif", ".avif", ".gif", ".jxl", ".jp2", EXR_SUFFIX, *RAW_SUFFIXES)
+"""Of pictures that are no photographs here."""
 _SUBFILE, _SUB_PAGES = 254, 330
 _REDUCED = (1, 3, 5, 7)
 """Tags of TIFF 6.0, and what the first may say."""
@@ -49,19 +52,20 @@ def files_inside(folder: Path, suffixes: tuple[str, ...]) -> list[Path]:
     return sorted(path for path in files if path.suffix.lower() in suffixes)
 
 
-def unread(folder: Path) -> str:
-    """In words, how many pictures directly inside `folder` are of formats that are not read; "" for none."""
-    counts = Counter(path.suffix.lower() for path in files_inside(folder, _OTHER_SUFFIXES))
+def unread(folder: Path, suffixes: tuple[str, ...]) -> str:
+    """In words, how many pictures directly inside `folder` do not end so, and are not read; "" for none."""
+    others = tuple(suffix for suffix in _OTHER_SUFFIXES if suffix not in suffixes)
+    counts = Counter(path.suffix.lower() for path in files_inside(folder, others))
     if not counts:
         return ""
     formats = ", ".join(f"{count} {suffix}" for suffix, count in sorted(counts.items()))
-    return f"left out are {formats}, which FSID does not read: save them as .png or .jpg"
+    return f"left out are {formats}, which are not read here: save them as .png or .jpg"
 
 
 def instead(folder: Path, suffixes: tuple[str, ...]) -> str:
     """What an error adds where `folder` holds no such files: where some lie, or what else is there; "" for
     neither."""
-    left_out = unread(folder)
+    left_out = unread(folder, suffixes)
     return _deeper(folder, suffixes) or (f"; {left_out}" if left_out else "")
 
 

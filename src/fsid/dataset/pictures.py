@@ -18,6 +18,7 @@ import numpy as np
 
 from fsid.assets.exr import stated_size, stated_values
 from fsid.dataset.photos import (
+    EXR_SUFFIX,
     PHOTO_SUFFIXES,
     SMALLEST_PX,
     check_photo,
@@ -29,7 +30,7 @@ from fsid.errors import FsidError, refuse_any
 from fsid.files import check_file
 from fsid.plurals import counted
 
-EXR_SUFFIX = ".exr"
+PICTURE_SUFFIXES = (*PHOTO_SUFFIXES, EXR_SUFFIX)
 _SRGB_CHROMATICITIES = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
 _MOST_PX = 2**27
 """Of a render; about as many as Pillow takes of a photograph."""
@@ -53,10 +54,10 @@ def find_pictures(folder: str | Path) -> list[Path]:
     folder = Path(folder)
     if not folder.is_dir():
         raise FsidError(f"{folder}: is not a folder of photographs or .exr renders")
-    suffixes = (*PHOTO_SUFFIXES, EXR_SUFFIX)
-    pictures = files_inside(folder, suffixes)
+    pictures = files_inside(folder, PICTURE_SUFFIXES)
     if not pictures:
-        raise FsidError(f"{folder}: holds no picture ({', '.join(suffixes)}){instead(folder, suffixes)}")
+        where = instead(folder, PICTURE_SUFFIXES)
+        raise FsidError(f"{folder}: holds no picture ({', '.join(PICTURE_SUFFIXES)}){where}")
     return pictures
 
 

@@ -28,11 +28,7 @@ from fsid.sensor import (
 )
 from fsid.sensor.bare import BARE_SUFFIXES, HEADERLESS_SUFFIXES
 from fsid.sensor.blind import contradiction, stated_noise
-
-RAW_SUFFIXES = frozenset(
-    """.3fr .arw .cr2 .cr3 .crw .dcr .dng .erf .fff .iiq .k25 .kdc .mef .mos .mrw .nef .nrw .orf .pef .raf
-    .rw2 .rwl .sr2 .srf .srw""".split()  # noqa: SIM905  a list of them would take a page
-)
+from fsid.sensor.frames import RAW_SUFFIXES
 
 _SMALLEST_PX = 22  # LibRaw takes no smaller image for a RAW
 

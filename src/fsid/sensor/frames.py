@@ -31,6 +31,10 @@ from fsid.sensor.quantise import check_levels
 SAME_LIGHT, SAME_DN = 0.03, 0.5  # difference of the levels of two frames of one burst, relative or in DN
 SAME_DARK = 3.0  # difference of the levels of two dark frames of one burst, in standard deviations of a pixel
 SAME_BLACK_DN = 1.0  # difference of the stated black levels of two frames of one mode: phones measure it anew
+RAW_SUFFIXES = frozenset(
+    """.3fr .arw .cr2 .cr3 .crw .dcr .dng .erf .fff .iiq .k25 .kdc .mef .mos .mrw .nef .nrw .orf .pef .raf
+    .rw2 .rwl .sr2 .srf .srw""".split()  # noqa: SIM905  a list of them would take a page
+)
 BESIDE_RAW = frozenset((".jpg", ".jpeg", ".heic", ".heif", ".xmp"))
 """What phones and converters store beside a RAW file."""
 _ISO_IN_PATH = re.compile(r"iso[-_ ]?(\d+)", re.IGNORECASE)
