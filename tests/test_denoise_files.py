@@ -455,6 +455,19 @@ def test_a_folder_may_be_finished_without_doing_it_again(
     )
 
 
+def test_a_link_that_leads_nowhere_is_a_file_that_cannot_be_read(
+    tmp_path: Path, network: Path, refused: Callable[..., str]
+) -> None:
+    (folder := tmp_path / "in").mkdir()
+    (folder / "folder.dng").mkdir()
+    write_dng(folder / "a.dng", noisy_raw())
+    (folder / "b.dng").symlink_to(tmp_path / "unplugged" / "b.dng")
+    told = refused("denoise", folder, tmp_path / "out", "--model", network, "--profile", "pixel6", "--quiet")
+    assert f"{folder / 'b.dng'}: " in told
+    assert "1 of 2 files" in told
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["a.dng"]
+
+
 def test_a_picture_keeps_its_own_iso(noisy_file: Path, network: Path) -> None:
     out = noisy_file.parent / "out.dng"
     own = read_raw(noisy_file).iso

@@ -68,9 +68,12 @@ def find_raws(folder: str | Path, *, bare: bool = False) -> list[Path]:
 
 
 def raws_inside(folder: Path, *, bare: bool) -> list[Path]:
-    """As `find_raws`, and none where there is none; FsidError where the folder cannot be read."""
+    """As `find_raws`, and none where there is none; FsidError where the folder cannot be read.
+
+    A link that leads nowhere is one of them: it stands for a file that cannot be read.
+    """
     try:
-        inside = sorted(path for path in folder.iterdir() if path.is_file())
+        inside = sorted(path for path in folder.iterdir() if not path.is_dir())
     except OSError as error:
         raise FsidError(f"{folder}: cannot be read ({error.strerror})") from None
     return [p for p in inside if p.suffix.lower() in _suffixes(bare) and not p.name.startswith(".")]
