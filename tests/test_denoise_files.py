@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import inspect
 import os
 import shutil
@@ -31,6 +32,7 @@ from fsid.denoise.interface import denoise  # noqa: E402
 from fsid.denoise.model import model_path  # noqa: E402
 from fsid.denoise.preview import PREVIEW_PX, preview_of  # noqa: E402
 from fsid.errors import FsidError  # noqa: E402
+from fsid.files import open_new  # noqa: E402
 from fsid.sensor import (  # noqa: E402
     Layout,
     NoiseLevel,
@@ -466,6 +468,38 @@ def test_a_link_that_leads_nowhere_is_a_file_that_cannot_be_read(
     assert f"{folder / 'b.dng'}: " in told
     assert "1 of 2 files" in told
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["a.dng"]
+
+
+@pytest.mark.parametrize("code", [errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES])
+def test_a_disk_that_takes_no_file_ends_a_folder(
+    tmp_path: Path, network: Path, monkeypatch: pytest.MonkeyPatch, refused: Callable[..., str], code: int
+) -> None:
+    """Else each of the others would be denoised for nothing."""
+    read, fits = [], {"a"}
+
+    def reading(path: Path, layout: Layout | None) -> Raw:
+        read.append(path.name)
+        return noisy_raw()
+
+    def full(part: Path) -> BinaryIO:
+        if part.name[0] in fits:
+            return open_new(part)
+        raise OSError(code, os.strerror(code))
+
+    (folder := tmp_path / "in").mkdir()
+    for name in "abcd":
+        (folder / f"{name}.dng").touch()
+    monkeypatch.setattr("fsid.denoise.files.read_input", reading)
+    monkeypatch.setattr("fsid.files.open_new", full)
+    command = ("denoise", folder, out := tmp_path / "out", "--model", network, "--quiet")
+    told = refused(*command)
+    assert read == ["a.dng", "b.dng"]
+    assert f"{out / 'b.dng'}: cannot be written ({os.strerror(code)}); " in told
+    assert "3 of 4 files are left, --skip-existing goes on from there" in told
+    assert [path.name for path in out.iterdir()] == ["a.dng"]
+    fits.clear()
+    refused(*command[:2], tmp_path / "new", *command[3:])
+    assert not (tmp_path / "new").exists()
 
 
 def test_a_picture_keeps_its_own_iso(noisy_file: Path, network: Path) -> None:

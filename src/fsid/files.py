@@ -75,8 +75,15 @@ def stamp(path: Path) -> tuple[int, ...]:
     return found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns
 
 
+class DiskError(FsidError):
+    """The disk is full, may not be written to, or this folder may not: nor will the next file there."""
+
+
+_NOR_THE_NEXT = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES)
+
+
 def write_atomically(path: Path, data: bytes) -> None:
-    """Replace `path` by `data`, or leave it as it was. FsidError where the disk refuses."""
+    """Replace `path` by `data`, or leave it as it was. FsidError where the disk refuses, see `DiskError`."""
     write_together({path: data})
 
 
@@ -100,7 +107,8 @@ def write_together(files: Mapping[Path, bytes]) -> None:
         for path, part in parts.items():
             os.replace(part, path)
     except OSError as error:
-        raise FsidError(f"{path}: cannot be written ({error.strerror})") from None
+        kind = DiskError if error.errno in _NOR_THE_NEXT else FsidError
+        raise kind(f"{path}: cannot be written ({error.strerror})") from None
     finally:
         for part in parts.values():
             with contextlib.suppress(OSError):  # gone already, or never there
@@ -118,10 +126,10 @@ def open_new(part: Path) -> BinaryIO:
 
 
 def check_folder(folder: Path) -> None:
-    """FsidError unless `folder` is there or can be made, and be written to: before the work that fills it."""
+    """DiskError unless `folder` is there or can be made, and be written to: before the work that fills it."""
     there = next(path for path in (folder, *folder.absolute().parents) if os.path.lexists(path))
     if not (there.is_dir() and os.access(there, os.W_OK | os.X_OK)):
-        raise FsidError(f"{folder}: cannot be written; {there} is no folder that you may write to")
+        raise DiskError(f"{folder}: cannot be written; {there} is no folder that you may write to")
 
 
 def check_output(path: Path) -> None:

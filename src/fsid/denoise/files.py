@@ -14,7 +14,7 @@ from pathlib import Path
 from fsid.denoise.denoise import Network, check_strength, denoise_raw
 from fsid.denoise.preview import preview_of
 from fsid.errors import FsidError
-from fsid.files import check_output, make_folder, paths_of, same_files
+from fsid.files import DiskError, check_output, make_folder, paths_of, same_files
 from fsid.sensor import (
     Layout,
     NoiseLevel,
@@ -219,8 +219,8 @@ def denoise_folder(
 
     The noise level that was used for each is returned. skip_existing: leave alone what is in `target`
     already; it is whole, as a DNG appears when all of it is written. denoised: told of each that is done.
-    failed: told of each file that cannot be denoised; FsidError says in the end how many they were. What is
-    wrong with all of them `check_options` tells before.
+    failed: told of each file that cannot be denoised; FsidError says in the end how many they were, or how
+    many are left where the disk takes no more. What is wrong with all of them `check_options` tells before.
     """
     target, paths = Path(target), paths_of(sources)
     names = [path.stem for path in paths]
@@ -235,6 +235,7 @@ def denoise_folder(
     is_new = not target.exists()
     make_folder(target)
     noises: dict[Path, Noise] = {}
+    refusal = ""
     for done, (source, out) in enumerate(zip(paths, targets, strict=True)):
         try:
             noises[source] = denoise_file(
@@ -248,15 +249,21 @@ def denoise_folder(
                 mend_hot_pixels=mend_hot_pixels,
                 layout=layout,
             )
+        except DiskError as error:  # before the others are denoised for nothing
+            where = f"{len(paths) - done} of {len(paths)} files are left, --skip-existing goes on from there"
+            refusal = f"{error}; {where}"
+            break
         except FsidError as error:
             failed(error)
         else:
             denoised(source, noises[source])
         if progress is not None:
             progress(done + 1, len(paths))
+    if is_new and paths and not noises:
+        with contextlib.suppress(OSError):  # something else came to lie in it
+            target.rmdir()
+    if refusal:
+        raise FsidError(refusal)
     if failures := len(paths) - len(noises):
-        if is_new and failures == len(paths):
-            with contextlib.suppress(OSError):  # something else came to lie in it
-                target.rmdir()
         raise FsidError(f"{failures} of {len(paths)} files could not be denoised")
     return noises
