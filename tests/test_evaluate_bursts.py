@@ -350,9 +350,9 @@ def test_a_noise_profile_that_states_nothing_is_none(clean: Raw, tmp_path: Path)
     assert not (tmp_path / "below").exists()
 
 
-def test_hidden_files_and_pictures_beside_the_raws_are_no_frames(clean: Raw, tmp_path: Path):
+def test_hidden_files_and_what_lies_beside_the_raws_are_no_frames(clean: Raw, tmp_path: Path):
     paths = _burst(tmp_path / "captures" / "fabric" / "1lux", clean)
-    for name in ("000.jpg", "000.xmp", "._000.dng"):
+    for name in ("000.jpg", "000.xmp", "._000.dng", "Thumbs.db", "notes.txt"):
         paths[0].with_name(name).write_bytes(b"no RAW")
     for hidden in (".thumbnails/1lux", "fabric/.cache"):
         (tmp_path / "captures" / hidden).mkdir(parents=True)

@@ -366,10 +366,20 @@ def test_frames_of_a_burst_are_like_its_first_one(tmp_path, rng):
     assert found.dark[0].same_dn == pytest.approx(3 * 12, rel=0.05)
 
 
-def test_a_frame_counts_once_and_hidden_files_and_pictures_not_at_all(tmp_path, rng):
+def test_a_frame_counts_once_and_hidden_files_and_what_lies_beside_frames_not_at_all(tmp_path, rng):
     folder = tmp_path / "iso100" / "iso800" / "deeper"
     frames = write_arrays(folder, [to_dn(raw) for raw in exposures(rng, scene(), 800, 5)])
-    for name in (".DS_Store", "000.JPG", "000.heic", "000.xmp"):
+    beside = (
+        "000.JPG",
+        "000.heic",
+        "000.xmp",
+        "Thumbs.db",
+        "desktop.ini",
+        "notes.txt",
+        "levels.csv",
+        "a.json",
+    )
+    for name in (".DS_Store", *beside, "mine.yaml", "README.md"):
         (folder / name).write_bytes(b"no frame")
     found = find_frames([tmp_path, *frames], [], replace(LAYOUT, iso=None))
     assert [frame.path for frame in found.frames] == frames
@@ -585,7 +595,11 @@ def test_bad_bursts_are_named(tmp_path, dng_bursts, rng):
     _fails("black70.dng.*one camera in one mode", [light, black70])
     _fails("lone.dng.*only 1 frame", [light, lone])
     _fails("only 2 frames", good[:2], layout=LAYOUT)
-    _fails("one kind", [light, *good])
+    _fails("000.npy.*one kind", [light, *good])
+    for name in ("000.tmp", "notes.txt"):  # the second is skipped in a folder alone
+        (tmp_path / name).write_bytes(b"no frame")
+        for paths in ([tmp_path / name, *good], [*good, tmp_path / name], [light, tmp_path / name, *good]):
+            _fails(f"{name}: is neither a RAW file nor a bare mosaic", paths)
     _fails("no such frame", [tmp_path / "none"])
     _fails("at least one burst", [])
     _fails("no dark frames and no black level", good, layout=replace(LAYOUT, black_level=None))

@@ -35,8 +35,10 @@ RAW_SUFFIXES = frozenset(
     """.3fr .arw .cr2 .cr3 .crw .dcr .dng .erf .fff .iiq .k25 .kdc .mef .mos .mrw .nef .nrw .orf .pef .raf
     .rw2 .rwl .sr2 .srf .srw""".split()  # noqa: SIM905  a list of them would take a page
 )
-BESIDE_RAW = frozenset((".jpg", ".jpeg", ".heic", ".heif", ".xmp"))
-"""What phones and converters store beside a RAW file."""
+BESIDE_RAW = frozenset(
+    ".jpg .jpeg .heic .heif .xmp .txt .md .csv .json .yaml .yml .ini .db".split()  # noqa: SIM905  likewise
+)
+"""What phones, converters, people and systems (Thumbs.db) store beside frames."""
 _ISO_IN_PATH = re.compile(r"iso[-_ ]?(\d+)", re.IGNORECASE)
 _SITES_DIFFER = 0.02  # of the level: a flat grey through colour filters differs by far more
 
@@ -142,9 +144,12 @@ def find_frames(paths: Sequence[Path], dark: Sequence[Path], layout: Layout) -> 
     if layout.iso is not None and not 0 < layout.iso < math.inf:
         raise FsidError(f"--iso {layout.iso:g}: must be a number above 0")
     bare = paths[0].suffix.lower() in BARE_SUFFIXES
-    for path in (*paths, *dark):
-        if (path.suffix.lower() in BARE_SUFFIXES) != bare:
-            raise FsidError(f"{path}: RAW files and bare mosaics in one calibration; give frames of one kind")
+    others = [path for path in (*paths, *dark) if (path.suffix.lower() in BARE_SUFFIXES) != bare]
+    for path in (*paths, *dark) if others else ():
+        if path.suffix.lower() not in RAW_SUFFIXES.union(BARE_SUFFIXES):
+            raise FsidError(f"{path}: is neither a RAW file nor a bare mosaic; leave it out")
+    for path in others:
+        raise FsidError(f"{path}: RAW files and bare mosaics in one calibration; give frames of one kind")
     if bare:
         return _bare_frames(paths, dark, layout)
     return _raw_frames(paths, dark, layout)
