@@ -57,6 +57,18 @@ def test_again_and_after_other_scenes(renderer: Renderer) -> None:
     assert fingerprint(renderer.render(scene(1))) == first
 
 
+@pytest.mark.parametrize("held", [1e3, np.nan])
+def test_what_the_image_of_shadows_held_leaves_nothing(renderer: Renderer, held: float) -> None:
+    """A lookup at the edge of a tile reads what lies beside it: of an earlier scene, or memory as it was."""
+    whole = sample(SceneConfig(), 1, width=64, height=48)
+    kept = ("objects", "materials", "transforms", "motions")
+    drawn = replace(whole, **{name: getattr(whole, name)[:12] for name in kept})
+    first = fingerprint(renderer.render(drawn))
+    moments = renderer._shadows._atlas._moments
+    moments.write(np.full((*moments.size, 2), held, np.float32))
+    assert fingerprint(renderer.render(drawn)) == first
+
+
 @pytest.mark.parametrize(
     "config",
     [

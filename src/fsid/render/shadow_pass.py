@@ -44,6 +44,7 @@ class ShadowPass:
         self._atlas = ShadowAtlas(context, drain, mips)
         self._depth = load_program(context, "depth.vert", None)
         self._moments = ScreenProgram(context, "moments.frag", compute=compute)
+        self._no_moments = ScreenProgram(context, "no_moments.frag", compute=compute)
         self._blocks = ScreenProgram(context, "shadow_blocks.frag", compute=compute, LENS=0, GRID=grid)
 
     def resize(self, plan: ShadowPlan) -> None:
@@ -75,6 +76,7 @@ class ShadowPass:
             buffers.draw(array, draw_commands(geometry.ranges, _casters(stage, tile)))
         self._context.enable_only(moderngl.NOTHING)
         canvas = self._atlas.begin_moments()
+        self._no_moments.draw(canvas)  # a lookup at a tile's edge reads its neighbour, at next to no weight
         for tile in seen:
             self._moments.set(middle=tile.middle)
             box = (tile.corner[0] // 2, tile.corner[1] // 2, tile.px // 2, tile.px // 2)
