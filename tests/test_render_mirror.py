@@ -140,3 +140,16 @@ def test_a_bent_lens_sees_the_mirror_image_where_it_is(renderer: Renderer) -> No
     relative = np.abs(bent - plain_image).mean(-1) / np.median(plain_image)
     assert np.median(relative) < 0.01
     assert np.quantile(relative, 0.95) < 0.2
+
+
+def test_a_wall_that_shines_is_seen_in_a_mirror(renderer: Renderer) -> None:
+    """As bright as it is: it is no light, which would have a highlight instead."""
+    behind = Transform((0.0, 1.0, 0.0), (90.0, 0.0, 0.0), ONE)
+    shown = []
+    for emission in (0.0, 2.0):
+        wall = Drawable(grid(8.0), behind, (replace(plain(), emission=emission),), BACKGROUND_ID)
+        frame = renderer.draw(view(ground(10), wall, ambient=0.2, camera=ACROSS), bake=bake_plain)
+        shown.append(frame.radiance[[5, 60], 80].mean(-1))  # the wall, and the floor before it
+    seen, mirrored = shown[1] - shown[0]
+    assert seen == pytest.approx(1.0, rel=0.01)
+    assert mirrored == pytest.approx(seen, rel=0.05)

@@ -4,7 +4,7 @@
 
 because p on the plane and the mirror image of what it reflects lie on one ray of the camera. The image is a
 third as large, or a quarter where the mirror blurs it anyway, without glass and without what shines: lights
-have highlights of their own.
+have highlights of their own. Walls and grounds that shine are no lights, so they are in it.
 
 A picture has two at most. One is the ground's indoors, or that of a table's top, which `Background` has at
 z = 0, wherever it is smooth enough to show any; out of doors the ground is flat for a few metres only, and

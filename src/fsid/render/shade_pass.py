@@ -57,8 +57,8 @@ class ShadePass:
         mirrors: Sequence[tuple[np.ndarray, Targets]] = (),
         shining: bool = True,
     ) -> None:
-        """Everything but glass. mirrors: planes, and the images that they show. shining: whether what emits
-        light is seen to."""
+        """Everything but glass. mirrors: planes, and the images that they show. shining: whether objects
+        and panels that shine are seen to; walls always are."""
         for i in range(MOST):
             self._reflectance.use(11 + i)  # any image will do where there is no mirror, but none will not
         for i, (_, image) in enumerate(mirrors):

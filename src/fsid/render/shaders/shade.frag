@@ -203,7 +203,8 @@ void main() {
         bool part = false;
         vec3 light = radiance(p, s, m, spread, part);
         missing = missing || part && hit;
-        light += OWN == 1 ? vec3(0) : shining * (s.emission * m.albedo + (front ? s.glow : vec3(0)));
+        float shown = s.object_id == 0 ? 1.0 : shining;    // walls are no lights and have no highlights
+        light += OWN == 1 ? vec3(0) : shown * s.emission * m.albedo + (front ? shining * s.glow : vec3(0));
 #if GLASS
         covered += hit ? members : 0.0;
         sum += hit ? members * light : vec3(0);
