@@ -154,6 +154,19 @@ def test_every_lobe_is_said(change: dict, extension: str):
     assert any(extension in material.get("extensions", {}) for material in found["materials"])
 
 
+def test_sheen_is_as_wide_as_ours():
+    """(2 + 1 / alpha) sin^(1 / alpha) / (2 pi), alpha the square of the roughness (Estevez and Kulla 2017),
+    is the 2 / pi sin^2 of `shaders/reflector.glsl`."""
+    found = document(glb_bytes(small_scene(replace(BRICK, sheen=0.5)), texture_size=64))
+    name = "KHR_materials_sheen"
+    sheens = [m["extensions"][name] for m in found["materials"] if name in m.get("extensions", {})]
+    assert sheens
+    sine = np.linspace(0.1, 1.0, 10)
+    for sheen in sheens:
+        power = 1 / sheen["sheenRoughnessFactor"] ** 2
+        np.testing.assert_allclose((2 + power) * sine**power / (2 * np.pi), 2 / np.pi * sine**2, rtol=1e-6)
+
+
 def test_what_goes_through_has_the_colour_of_the_surface():
     """As in `shaders/reflector.glsl`: without a colour of its own it is white, brighter than any leaf."""
     found = document(glb_bytes(small_scene(replace(BRICK, translucency=0.4)), texture_size=64))

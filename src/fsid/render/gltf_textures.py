@@ -41,6 +41,12 @@ _ROUGHNESS_STEP = 0.1
 
 _FLAT = 1.5 / 255
 
+SHEEN_ALPHA = 0.5
+"""Width of the lobe of fibres in shaders/reflector.glsl, where it makes sin^(1 / alpha) a square."""
+
+SHEEN_ROUGHNESS = SHEEN_ALPHA**0.5
+"""The same for KHR_materials_sheen, which squares it."""
+
 
 def boxed(surface: Surface, material: Material) -> Boxed:
     """The surface with texture coordinates; vertices are doubled where triangles lie on different planes."""
@@ -120,7 +126,10 @@ def extensions(material: Material, colour: dict[str, Any]) -> dict[str, Any]:
             "clearcoatRoughnessFactor": material.clearcoat_roughness,
         }
     if material.sheen > 0:
-        out["KHR_materials_sheen"] = {"sheenColorFactor": [material.sheen] * 3, "sheenRoughnessFactor": 0.5}
+        out["KHR_materials_sheen"] = {
+            "sheenColorFactor": [material.sheen] * 3,
+            "sheenRoughnessFactor": SHEEN_ROUGHNESS,
+        }
     if material.transmission > 0:
         out["KHR_materials_transmission"] = {"transmissionFactor": material.transmission}
         out["KHR_materials_ior"] = {"ior": 1.5}

@@ -44,7 +44,7 @@ float coat_reflected(float alpha, vec3 n, vec3 v, vec3 l) {
     return clear_fresnel(c) * share;
 }
 
-// Cloth's fuzz of roughness 0.5 (Estevez and Kulla 2017) with the visibility of Neubelt and Pettineo (2013); f * cos.
+// Cloth's fuzz of alpha 0.5 (Estevez and Kulla 2017) with the visibility of Neubelt and Pettineo (2013); f * cos.
 float fuzz(vec3 n, vec3 v, vec3 l) {
     float nl = max(dot(n, l), 0.0), nv = max(abs(dot(n, v)), 1e-3), nh = dot(n, normalize(v + l));
     return (2.0 / PI) * max(1.0 - nh * nh, 0.0) * nl / (4.0 * max(nl + nv - nl * nv, 1e-3));
