@@ -3,9 +3,10 @@
     glTF (x, y, z) = ours (x, z, -y)          one node at the root turns z up into y up
 
 Radiant intensity becomes candela with 683 lm/W, as other exporters count, so relative brightness is kept and
-the exposure is the reader's. What glTF cannot say is left out or approximated: soft shadows (lights are
-points), area lights (emitting rectangles), sky and ambient light, motion, lens distortion. The scene itself,
-exactly, is in `asset.extras.fsid` as `fsid.scene.scene_to_json` writes it.
+the exposure is the reader's. What emits has its radiance as it is: Blender divides by 683 for lights alone.
+What glTF cannot say is left out or approximated: soft shadows (lights are points), area lights (emitting
+rectangles), sky and ambient light, motion, lens distortion. The scene itself, exactly, is in
+`asset.extras.fsid` as `fsid.scene.scene_to_json` writes it.
 """
 
 from __future__ import annotations
