@@ -338,3 +338,10 @@ def test_depth_may_differ_by_what_half_a_pixel_changes_and_no_more():
     assert np.abs(frame(0.75).depth / frame(0.5).depth - 1).max() > 0.05
     assert agreement(frame(0.75), frame(0.5)).depth_off == 0
     assert agreement(frame(0.5, 1.15), frame(0.5)).depth_off == 1
+
+
+def test_a_vignette_takes_all_light_and_no_more():
+    """As shaders/shade.frag: where the polynomial is below 0 the image is black."""
+    gain = reference_renderer._vignette(replace(DOWN, vignetting=(-1.5, 0.0, 0.0)))
+    assert gain.min() == 0
+    assert gain.max() == pytest.approx(1.0, abs=0.01)

@@ -215,12 +215,12 @@ def _sensor(mi: Any, camera: Camera, lens: Lens, *, regular: bool = False) -> di
 
 
 def _vignette(camera: Camera) -> np.ndarray:
-    """(H, W) gain by distance from the centre, 1 in the corner."""
+    """(H, W) gain >= 0 by distance from the centre, 1 in the corner."""
     y, x = np.mgrid[: camera.height, : camera.width] + 0.5
     centre = np.array((camera.width, camera.height)) / 2
     r2 = ((x - centre[0]) ** 2 + (y - centre[1]) ** 2) / (centre**2).sum()
     a1, a2, a3 = camera.vignetting
-    return np.asarray(1 + r2 * (a1 + r2 * (a2 + r2 * a3)))
+    return np.maximum(1 + r2 * (a1 + r2 * (a2 + r2 * a3)), 0.0)
 
 
 def _moves(camera: Camera) -> bool:
