@@ -386,7 +386,8 @@ def lowest(solids: list[Solid]) -> float:
 
 
 @pytest.mark.parametrize(
-    "family", ["armchair", "bench", "office_chair", "parcel", "pendant_lamp", "scissors"]
+    "family",
+    ["armchair", "bench", "lamp", "office_chair", "parcel", "pendant_lamp", "scissors", "spectacles"],
 )
 def test_all_of_a_thing_hangs_together(family):
     """From any of its solids a path of solids that touch leads to any other: nothing is held by nothing."""
@@ -394,7 +395,7 @@ def test_all_of_a_thing_hangs_together(family):
         assert len(groups_that_touch(flat(solids_of(family, seed)))) == 1, (family, seed)
 
 
-@pytest.mark.parametrize("family", ["towels", "toy_blocks"])
+@pytest.mark.parametrize("family", ["logs", "towels", "toy_blocks"])
 def test_what_is_piled_up_lies_on_what_is_below(family):
     """Everything that touches reaches down to the floor."""
     for seed in range(8):
@@ -598,6 +599,12 @@ def test_handles_end_in_the_wall(family, vessel, handles):
             assert (x > np.interp(z, *inner.T))[z > inner[0, 0]].all(), seed
             assert (x < np.interp(z, *outer.T)).any(), seed
     assert eared
+
+
+def test_mushrooms_all_stand_on_the_ground():
+    for seed in range(12):
+        lows = [lowest([stalk]) for stalk in solids_of("mushrooms", seed)["stalk"]]
+        assert np.ptp(lows) < 1e-6, seed
 
 
 def test_the_head_under_a_wig_is_under_it():

@@ -21,17 +21,23 @@ def lamp(rng: np.random.Generator) -> Parts:
     low, top, tall = rng.uniform(0.12, 0.22), rng.uniform(0.07, 0.14), rng.uniform(0.14, 0.26)
     t = np.linspace(0, 1, 8)
     waist = rng.uniform(-0.12, 0.12)
-    shade = hollow(low + (top - low) * t - waist * low * np.sin(np.pi * t), t * tall, 0.002, bottom=False)
+    outer, depth = low + (top - low) * t - waist * low * np.sin(np.pi * t), 0.0
+    shade = hollow(outer, t * tall, 0.002, bottom=False)
     if rng.random() < 0.5:
-        shade = _pleated(rng, low, top, tall)
+        outer = low + (top - low) * t
+        shade, depth = _pleated_rand(rng, low, top, tall)
     base = [cone(foot, foot * rng.uniform(0.5, 0.95), rng.uniform(0.012, 0.05), 0.005, 40)]
     post = height - tall * 0.4
     if floor or rng.random() < 0.5:
         pole = cylinder(stem, post - 0.004, 0.002, 16).at(z=0.004)
     else:
         pole = turned_post(rng, rng.uniform(0.02, 0.06), post - 0.004, 28).at(z=0.004)
-    spokes = [box(2 * top * 0.98, 0.004, 0.003, 0.001).turned(z_deg=60 * k) for k in range(3)]
-    metal = [pole, *(s.at(z=height - 0.12 * tall + 0.0015 * k) for k, s in enumerate(spokes))]
+    held = height - 0.12 * tall
+    rod = cylinder(0.003, held - post + 0.01, 0.001, 12).at(z=post - 0.005)
+    inside, a = (np.interp(0.88, t, outer) - 0.002) * (1 - depth), np.linspace(0, 2 * np.pi, 49)[:-1]
+    hoop = sweep(np.c_[inside * np.cos(a), inside * np.sin(a), np.full(48, held)], 0.0015, 6, closed=True)
+    spokes = [box(2 * inside, 0.004, 0.003, 0.001).turned(z_deg=60 * k) for k in range(3)]
+    metal = [pole, rod, hoop, *(s.at(z=held - 0.003 + 0.0015 * k) for k, s in enumerate(spokes))]
     bulb = ball(0.03, 3).at(z=height - tall * 0.45)
     return {"foot": base, "stem": metal, "shade": [shade.at(z=height - tall)], "bulb": [bulb]}
 
@@ -189,7 +195,8 @@ def _spring(start: np.ndarray, end: np.ndarray) -> Solid:
     return sweep(start + t * (end - start) + 0.006 * coil, 0.0011, 5)
 
 
-def _pleated(rng: np.random.Generator, low: float, top: float, tall: float) -> Solid:
+def _pleated_rand(rng: np.random.Generator, low: float, top: float, tall: float) -> tuple[Solid, float]:
+    """A conical shade and the depth of its pleats, a share of its radius."""
     count, depth = int(rng.integers(24, 60)), rng.uniform(0.015, 0.04)
     t = np.linspace(0, 1, 4)
     shade = hollow(low + (top - low) * t, t * tall, 0.002, bottom=False, segments=4 * count)
@@ -198,4 +205,4 @@ def _pleated(rng: np.random.Generator, low: float, top: float, tall: float) -> S
         pleat = 1 + depth * np.cos(count * np.arctan2(points[:, 1], points[:, 0]))
         return np.c_[points[:, :2] * pleat[:, None], points[:, 2]]
 
-    return shade.warped(warp)
+    return shade.warped(warp), depth

@@ -121,6 +121,8 @@ def logs(rng: np.random.Generator) -> Parts:
     radius, length = rng.uniform(0.04, 0.09), rng.uniform(0.15, 0.4)
     barks, ends = [], []
     row = int(rng.integers(1, 4))
+    reach, step = 120, radius / 100  # of a net across the logs, wide enough for 1.2 radii
+    pile = np.zeros((14, 7 * reach))
     for level in range(row):
         for k in range(row - level):
             size = radius * rng.uniform(0.85, 1.0)
@@ -135,7 +137,15 @@ def logs(rng: np.random.Generator) -> Parts:
             rings = np.stack(np.broadcast_arrays(r * np.cos(a), r * np.sin(a), length * (s - 0.5)), axis=-1)
             bark = loft(rings)
             spin = rng.uniform(0, 360)
-            place = (0.0, 2.06 * radius * (k - (row - level - 1) / 2), radius * (1 + 1.8 * level))
+            turn = rotation_matrix(y_deg=90) @ rotation_matrix(z_deg=spin)
+            low, high = _profiles(rings @ turn.T, step * np.arange(-reach, reach + 1))
+            middle = 3 * reach + 103 * (2 * k - (row - level - 1))
+            spots = np.arange(middle - 50 * (level > 0), middle + 51)
+            lifts = [float((pile[:, m - reach : m + reach + 1] - low).max()) for m in spots]
+            m, lift = int(spots[np.argmin(lifts)]), min(lifts)  # where it can roll no lower
+            beneath = pile[:, m - reach : m + reach + 1]
+            np.maximum(beneath, lift + high, out=beneath)
+            place = (0.0, step * (m - 3 * reach), lift)
             barks.append(bark.turned(z_deg=spin).turned(y_deg=90).at(*place))
             for s_end in (0, -1):
                 face = rings[s_end] * (0.88, 0.88, 1.0)
@@ -201,6 +211,20 @@ def feathers(rng: np.random.Generator) -> Parts:
         "yarn_barbs": [v.turned(z_deg=spin) for v in vanes],
         "plastic_quill": [q.turned(z_deg=spin) for q in quills],
     }
+
+
+def _profiles(rings: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(R, len(y)) each: lowest and highest z of closed outlines (R, n, 3) about the x axis at `y`; beside an
+    outline it is inf and -inf."""
+    low, high = np.full((len(rings), len(y)), np.inf), np.full((len(rings), len(y)), -np.inf)
+    for ring, below, above in zip(rings, low, high, strict=True):
+        across = ring[np.argsort(ring[:, 1])]
+        for out, half, none in (
+            (below, across[across[:, 2] < 0], np.inf),
+            (above, across[across[:, 2] > 0], -np.inf),
+        ):
+            out[:] = np.interp(y, half[:, 1], half[:, 2], left=none, right=none)
+    return low, high
 
 
 def _point_rand(rng: np.random.Generator, length: float, radius: float) -> Solid:

@@ -227,7 +227,8 @@ def mushrooms(rng: np.random.Generator) -> Parts:
         d = sunflower(40)[23:38]
         on_cap = np.c_[d[:, :2], d[:, 2] * open_] * r * 0.99
         dots = copies(ball(0.05 * r, 1).stretched(1, 1, 0.5), turns_to(d), on_cap).at(z=tall)
-        group.append([part.turned(*lean) for part in (head, stem, fan, dots)])
+        lift = -float(stem.turned(*lean).vertices[:, 2].min())
+        group.append([part.turned(*lean).at(z=lift) for part in (head, stem, fan, dots)])
     parts = zip(*spread(group, spots), strict=True)
     named = dict(zip(("peel_cap", "stalk", "gills", "warts"), parts, strict=True))
     return named if rng.random() < 0.5 else {name: named[name] for name in ("peel_cap", "stalk", "gills")}

@@ -164,8 +164,9 @@ def spectacles(rng: np.random.Generator) -> Parts:
         folded = 88.0 * side if rng.random() < 0.3 else rng.normal(0, 3)
         temple = sweep(path, wire * (1 + 0.8 * s**2), 8).turned(z_deg=folded)
         temples.append(temple.at(side * (gap + wide + 0.003), 0.003 + 0.004 * (side > 0), 0.036))
+        deep = 0.012 if side > 0 else 0.004  # the temple on this side starts farther back
         temples.append(
-            box(0.006, 0.004, 2.4 * wire, 0.0005, 1).at(side * (gap + wide + 0.001), 0.0, 0.036 - wire)
+            box(0.006, deep, 2.4 * wire, 0.0005, 1).at(side * (gap + wide + 0.001), 0.0, 0.036 - wire)
         )
     return {"plastic_rims": rims, "glass": lenses, "metal_bridge": metal, "plastic_temples": temples}
 
