@@ -202,6 +202,7 @@ HEAPS = {
     "bolts": ("metal_bolts", "metal_nuts", "metal_washers"),
     "pencils": ("shaft", "shaft_other"),
     "scissors": ("plastic_grips",),
+    "screwdriver": ("plastic_handles",),
     "polyhedron": ("glass_gem", "stone"),
     "seashells": ("ceramic_spirals", "ceramic_fans"),
     "springs": ("metal",),
@@ -599,6 +600,25 @@ def test_handles_end_in_the_wall(family, vessel, handles):
             assert (x > np.interp(z, *inner.T))[z > inner[0, 0]].all(), seed
             assert (x < np.interp(z, *outer.T)).any(), seed
     assert eared
+
+
+def test_screwdrivers_do_not_lie_across_each_other():
+    """No handle or blade meets that of another."""
+    for seed in range(30):
+        parts = solids_of("screwdriver", seed)
+        assert len(groups_that_touch(flat(parts))) == len(parts["plastic_handles"]), seed
+
+
+def test_a_handle_above_a_teapot_clears_its_lid():
+    above = 0
+    for seed in range(40):
+        parts = solids_of("teapot", seed)
+        handle = parts["handle"][0].vertices
+        above += handle[:, 0].max() > 0
+        for solid in parts["lid"]:
+            planes = ConvexHull(solid.vertices).equations
+            assert (handle @ planes[:, :3].T + planes[:, 3]).max(1).min() > 1e-4, seed
+    assert above
 
 
 def test_mushrooms_all_stand_on_the_ground():

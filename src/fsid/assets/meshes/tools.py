@@ -88,7 +88,7 @@ def wrench(rng: np.random.Generator) -> Parts:
 @mesh_family("screwdriver")
 def screwdriver(rng: np.random.Generator) -> Parts:
     """Screwdrivers with fluted handles, flat or cross tips."""
-    handles, blades, y = [], [], 0.0
+    tools, drawn = [], []
     for _ in range(int(rng.integers(1, 5))):
         radius, length = rng.uniform(0.009, 0.018), rng.uniform(0.07, 0.11)
         s = np.linspace(0, 1, 18)
@@ -111,11 +111,17 @@ def screwdriver(rng: np.random.Generator) -> Parts:
         else:
             tip = [box(1.9 * thin, 0.6 * thin, 0.008, 0.0002, 1).turned(z_deg=90 * k) for k in range(2)]
         parts = [body.warped(flute), rod, *(t.at(z=length + reach - 0.007) for t in tip)]
-        turn = rng.normal(0, 6)
-        laid = [p.turned(y_deg=90).turned(z_deg=turn).at(0, y, radius) for p in parts]
+        drawn.append((radius, rng.normal(0, 6)))
+        tools.append([p.turned(y_deg=90).at(z=radius) for p in parts])
+    radii, turns = np.array(drawn).T
+    turns = np.sort(turns)  # they fan out, so that none lies across the next
+    steepest = np.radians(np.maximum(np.abs(turns[1:]), np.abs(turns[:-1])))
+    y = np.r_[0, np.cumsum(1.6 * (radii[1:] + radii[:-1]) / np.cos(steepest))]
+    handles, blades = [], []
+    for k, parts in enumerate(tools):
+        laid = [p.turned(z_deg=float(turns[k])).at(y=float(y[k])) for p in parts]
         handles.append(laid[0])
         blades += laid[1:]
-        y += 3.2 * radius
     return {"plastic_handles": handles, "metal_blades": blades}
 
 

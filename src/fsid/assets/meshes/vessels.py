@@ -211,16 +211,8 @@ def teapot(rng: np.random.Generator) -> Parts:
     bend, far = rng.uniform(0.1, 0.5), radius * rng.uniform(0.7, 1.1)
     up = height * (0.3 + rng.uniform(0.55, 0.75) * (s ** (1 + 2 * bend)))
     spout = sweep(np.c_[radius * 0.75 + far * s, 0 * s, up], radius * (0.24 - 0.15 * s), 14)
-    if rng.random() < 0.6:
-        a = np.linspace(-1.75, 1.75, 22)
-        path = np.c_[
-            -0.8 * radius - 0.55 * radius * (np.cos(a) + 0.2), 0 * a, height * (0.55 + 0.33 * np.sin(a))
-        ]
-    else:
-        a = np.linspace(0, np.pi, 26)
-        tall = height * rng.uniform(0.4, 0.8)
-        path = np.c_[0.7 * radius * np.cos(a), 0 * a, height * 0.86 + tall * np.sin(a)]
-    handle = sweep(path, radius * rng.uniform(0.07, 0.11), 12)
+    tall = None if rng.random() < 0.6 else height * rng.uniform(0.5, 0.9)
+    thick = radius * rng.uniform(0.07, 0.11)
     dome = np.linspace(0, np.pi / 2, 8)
     top = rng.uniform(0.15, 0.35) * radius
     lid = lathe(
@@ -229,7 +221,25 @@ def teapot(rng: np.random.Generator) -> Parts:
     )
     knob = ball(radius * rng.uniform(0.12, 0.18), 2).stretched(1, 1, rng.uniform(0.7, 1.3))
     lids = [lid.at(z=height + 0.0005), knob.at(z=height + top + 0.1 * radius)]
-    return {"ceramic_body": [body, spout], "handle": [handle], "lid": lids}
+    if tall is None:
+        a = np.linspace(-1.75, 1.75, 22)
+        path = np.c_[
+            -0.8 * radius - 0.55 * radius * (np.cos(a) + 0.2), 0 * a, height * (0.55 + 0.33 * np.sin(a))
+        ]
+    else:
+        foot, shoulder = float(np.interp(0.75, t, belly)), 0.75 * height
+        path = _arch(foot, tall, thick + 0.02 * radius, join(lids).vertices - (0, 0, shoulder))
+        path += (0, 0, shoulder)
+    return {"ceramic_body": [body, spout], "handle": [sweep(path, thick, 12)], "lid": lids}
+
+
+def _arch(foot: float, tall: float, away: float, points: np.ndarray) -> np.ndarray:
+    """(n, 3) path of a handle in the plane of x and z, from `foot` to -`foot`: a superellipse, `tall` or as
+    tall as it takes to stay `away` from `points` (n, 3) about the z axis."""
+    beside = np.hypot(points[:, 0], points[:, 1]) / (foot - away)
+    tall = max(tall, away + float((points[:, 2] / np.cbrt(1 - beside**3)).max()))
+    c, s = np.cos(np.linspace(0, np.pi, 34)), np.sin(np.linspace(0, np.pi, 34))
+    return np.c_[foot * np.sign(c) * np.abs(c) ** (2 / 3), 0 * c, tall * np.abs(s) ** (2 / 3)]
 
 
 @mesh_family("jar")
