@@ -627,6 +627,23 @@ def test_mushrooms_all_stand_on_the_ground():
         assert np.ptp(lows) < 1e-6, seed
 
 
+@pytest.mark.filterwarnings("ignore:invalid value")
+def test_the_lining_of_a_hat_does_not_come_through():
+    """Seen from above, what looks up is above what looks down."""
+    for seed in range(8):
+        (felt,) = solids_of("hat", seed)["cloth_felt"]
+        low, step = felt.vertices[:, :2].min(0), 0.004
+        shape = tuple((np.ptp(felt.vertices[:, :2], axis=0) / step).astype(int) + 2)
+        a, b, c = (felt.vertices[felt.faces[:, k]] for k in range(3))
+        up = np.cross(b - a, c - a)[:, 2]
+        outside, lining = (
+            heights(Solid(felt.vertices, felt.normals, felt.faces[seen]), low, shape, step)[1]
+            for seen in (up > 0, up < 0)
+        )
+        both = np.isfinite(outside) & np.isfinite(lining)
+        assert (outside - lining)[both].min() > 0, seed
+
+
 def test_the_head_under_a_wig_is_under_it():
     """No lock goes into it, and hair is near all of its upper third."""
     for seed in range(6):

@@ -79,8 +79,12 @@ def hat(rng: np.random.Generator) -> Parts:
         *np.c_[radius * brim * np.linspace(1, 0, 8)[:-1] + radius * np.linspace(0, 1, 8)[:-1], np.zeros(7)]
     ]
     upper = [(brim * radius, -thick), (brim * radius, 0.0), *out[1:], *crown, *roof[1:]]
-    inner = [(0, tall - thick), (0.73 * radius, tall - thick), (radius - thick, -thick)]
-    curl, dent, waves = rng.uniform(-0.2, 0.3), rng.uniform(0, 0.4), int(rng.integers(2, 4))
+    inner = [  # as many rings as outside, so that `shape` bends both alike and neither comes through
+        *np.c_[0.73 * radius * np.linspace(0, 1, 8), np.full(8, tall - thick)],
+        *np.c_[np.linspace(0.73 * radius, radius - thick, 14), np.linspace(tall - thick, -thick, 14)][1:],
+        *np.c_[np.linspace(radius - thick, brim * radius, 8)[1:-1], np.full(6, -thick)],
+    ]
+    curl, dent, waves = rng.uniform(-0.2, 0.3), 0.75 * rng.uniform(0, 0.4), int(rng.integers(2, 4))
 
     def shape(p: np.ndarray) -> np.ndarray:
         r, a = np.hypot(p[:, 0], p[:, 1]), np.arctan2(p[:, 1], p[:, 0])
