@@ -644,6 +644,15 @@ def test_the_lining_of_a_hat_does_not_come_through():
         assert (outside - lining)[both].min() > 0, seed
 
 
+def test_a_crate_full_of_bottles_is_light():
+    for seed in (15, 29, 132):
+        assert len(build_mesh("crate", seed).faces) <= 20000, seed
+
+
+def test_arms_of_a_desk_lamp_end_beneath_the_faces_of_its_joints():
+    assert fighting_share(build_mesh("desk_lamp", 7), between_parts=True) < 1e-4
+
+
 def test_the_head_under_a_wig_is_under_it():
     """No lock goes into it, and hair is near all of its upper third."""
     for seed in range(6):

@@ -56,9 +56,9 @@ def desk_lamp(rng: np.random.Generator) -> Parts:
         along = np.linspace(a, b, 4)
         for y in (-0.012, 0.012) if rng.random() < 0.7 else (0.0,):
             arms.append(sweep(along, tube, 10).at(y=y))
-        joints.append(cylinder(0.014, 0.036, 0.003, 20).at(z=-0.018).turned(x_deg=90).at(*a))
+        joints.append(cylinder(0.014, 0.04, 0.003, 20).at(z=-0.02).turned(x_deg=90).at(*a))
         joints.append(_spring(a + 0.15 * (b - a), a + 0.5 * (b - a)))
-    joints.append(cylinder(0.012, 0.036, 0.003, 20).at(z=-0.018).turned(x_deg=90).at(*wrist))
+    joints.append(cylinder(0.012, 0.04, 0.003, 20).at(z=-0.02).turned(x_deg=90).at(*wrist))
     wide, deep = rng.uniform(0.05, 0.085), rng.uniform(0.08, 0.14)
     s = np.linspace(0, 1, 14)
     bell = hollow(0.022 + (wide - 0.022) * s ** rng.uniform(0.6, 2.5), s * deep, 0.0015, segments=40)

@@ -150,7 +150,7 @@ def _bottles_rand(rng: np.random.Generator, x: float, y: float, z: float) -> lis
     size = rng.uniform(0.03, 0.045)
     t = np.linspace(0, 1, 14)
     shape = size * np.where(t < 0.6, 1.0, 1 - 0.68 * np.clip((t - 0.6) / 0.2, 0, 1))
-    bottle = hollow(shape, t * z * rng.uniform(0.9, 1.5), 0.003, segments=24)
+    bottle = hollow(shape, t * z * rng.uniform(0.9, 1.5), 0.003, segments=20)
     nx, ny = int((x - 0.06) / (2.1 * size)), int((y - 0.06) / (2.1 * size))
     places = [
         ((i - (nx - 1) / 2) * 2.1 * size, (j - (ny - 1) / 2) * 2.1 * size)
