@@ -18,6 +18,7 @@ from fsid.assets import (
 from fsid.assets.material_registry import draw_material
 from fsid.assets.materials import images, sheets
 from fsid.assets.patterns import cells, joint, level, noise, shade, stack, warp
+from fsid.assets.triangle import PICTURE, decode
 from fsid.errors import FsidError
 
 REPOSITORY = Path(__file__).resolve().parents[1]
@@ -84,6 +85,16 @@ class TestEveryFamily:
         for variant in range(MATERIAL_VARIANTS):
             detail = baked[family, variant].detail
             assert np.mean((detail <= 0) | (detail >= 1)) < 0.12
+
+    def test_no_colour_of_nature_is_brighter_than_white(self, baked, family):
+        """Bright grain would be cut to flat white. A picture may be white, where it shows white paper."""
+        for variant in range(MATERIAL_VARIANTS):
+            colours = material_colours(family, variant)
+            if colours in (None, PICTURE):
+                continue
+            maps = baked[family, variant]
+            albedo = decode(maps.mix, maps.pattern, maps.detail, colours)
+            assert np.mean(albedo.max(-1) > 0.95) < 1.5e-3, variant
 
     def test_family_and_variant_decide_alone(self, baked, family):
         again = bake_material(family, 1, SIZE)

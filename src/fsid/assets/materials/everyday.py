@@ -12,7 +12,7 @@ from fsid.assets.patterns import axes, cells, edge, level, noise, scratches
     "paper",
     tile_m=0.3,
     relief_m=0.004,
-    colours=("f2eee4 e6dfcf c9bfa8", "d8c6a0 c2ab7d 8a7350", "f6f4ef ebe8e0 7a8fb0", "b5c4a8 9fb090 e8e4d4"),
+    colours=("f2eee4 e6dfcf c9bfa8", "d8c6a0 c2ab7d 8a7350", "f2f0eb e7e4dc 788dad", "b5c4a8 9fb090 e8e4d4"),
 )
 def paper(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """Sheets: smooth, kraft, crumpled, hand-made with fibres and petals."""

@@ -12,7 +12,7 @@ from fsid.assets.patterns import cells, edge, level, noise
     "bread",
     tile_m=0.12,
     relief_m=0.0012,
-    colours=("e6d2a8 cfae78 a9713a", "d9b98a b98a52 7a4a22", "8f6a45 6b4a2e 3f2a18", "f0e2c0 dcc292 b5834a"),
+    colours=("e6d2a8 cfae78 a9713a", "d9b98a b98a52 7a4a22", "8f6a45 6b4a2e 3f2a18", "ecdebc d8be8f b28048"),
 )
 def bread(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """Crumb with bubbles of many sizes, crust with flour and seeds for odd variants."""
@@ -91,7 +91,7 @@ def peel(rng: np.random.Generator, variant: int, size: int) -> Layers:
     "cured_meat",
     tile_m=0.12,
     relief_m=0.0008,
-    colours=("a83a36 c25a4f f0ddd0", "8f2a30 b04a48 ecd2c6", "c9706a dd938a f5e6dc", "6f2226 933a3a e3c4b4"),
+    colours=("a83a36 c25a4f f0ddd0", "8f2a30 b04a48 ecd2c6", "c56e68 d99087 f1e2d8", "6f2226 933a3a e3c4b4"),
 )
 def cured_meat(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """Salami, ham, marbled steak, bresaola: lean fibres with lobes, veins or specks of fat."""
@@ -119,7 +119,7 @@ def cured_meat(rng: np.random.Generator, variant: int, size: int) -> Layers:
     "cheese",
     tile_m=0.15,
     relief_m=0.0015,
-    colours=("e8c25a f0d488 c99a3a", "e6dcb8 d3c598 7a8a9a", "d98a2a e6a552 a8621a", "f2ecd8 e3d9b8 c2b27a"),
+    colours=("e5c059 edd286 c79839", "e6dcb8 d3c598 7a8a9a", "d98a2a e6a552 a8621a", "f2ecd8 e3d9b8 c2b27a"),
 )
 def cheese(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """Smooth paste: with holes for 0 and 3, with blue veins for 1, plain for 2."""

@@ -119,7 +119,7 @@ def concrete(rng: np.random.Generator, variant: int, size: int) -> Layers:
     colours=(
         "9a4a38 b5694f c2b8a8",
         "8a3f30 a85a45 d0c8bc",
-        "c9a078 dcc09a 8f8578",
+        "c39b74 d6bb96 8b8174",
         "7a5a4a 94705c b0a89c",
     ),
 )

@@ -181,9 +181,9 @@ def gravel(rng: np.random.Generator, variant: int, size: int) -> Layers:
     tile_m=0.4,
     relief_m=0.006,
     colours=(
-        "d2b98c e3d0a8 8a7350",
-        "c9a878 dfc49c 6b5a45",
-        "e0d0b0 f0e4cc a8987a",
+        "c5ae83 d5c39e 816c4b",
+        "be9e71 d3b993 655441",
+        "c5b69a d3c8b3 93856a",
         "a58a68 c2a882 5f4f3c",
     ),
 )
@@ -209,9 +209,9 @@ def sand(rng: np.random.Generator, variant: int, size: int) -> Layers:
     relief_m=0.005,
     colours=(
         "8a6a45 b08f62 3a2a1c",
-        "d9c4a0 efe4cc 6b4a2c",
+        "bba98a cec5b0 5b3f24",
         "5f5a54 8a857c 2a2624",
-        "b5763a d99f5c f2e8d8",
+        "9e6631 be8b4f d4cbbd",
     ),
 )
 def fur(rng: np.random.Generator, variant: int, size: int) -> Layers:

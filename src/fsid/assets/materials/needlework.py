@@ -78,7 +78,7 @@ def embroidery(rng: np.random.Generator, variant: int, size: int) -> Layers:
     relief_m=0.012,
     colours=(
         "b8323a 2f6fa8 e6b422",
-        "3f8f5a c04f8f f0e6d0",
+        "3e8d59 be4e8d ede3ce",
         "5a3f8f d97b2f 8fc1c9",
         "d8d2c4 6e8f3a a33b2b",
     ),

@@ -142,7 +142,7 @@ def straw(rng: np.random.Generator, variant: int, size: int) -> Layers:
     "snow",
     tile_m=0.6,
     relief_m=0.009,
-    colours=("e8edf4 cfdbea ffffff", "e3e6ea b9c4d2 8a8074", "f2f5f8 dfe8f2 a9c0dc", "dfe5ec c2cfdf 5f6f5a"),
+    colours=("dfe4eb c7d3e1 f5f5f5", "e3e6ea b9c4d2 8a8074", "e6e9ec d4dde6 a1b7d1", "dfe5ec c2cfdf 5f6f5a"),
 )
 def snow(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """Powder, trodden, wind-carved and thawing snow: soft shades of blue, glints, crumbs."""

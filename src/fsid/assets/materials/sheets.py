@@ -82,7 +82,7 @@ def _table(
         draw.line((x, top, x, y), fill=180, width=pen(size, rule))
 
 
-@material_family("barcodes", tile_m=0.2, relief_m=0.0001, colours="f5f4f0 e3d3b0 141414")
+@material_family("barcodes", tile_m=0.2, relief_m=0.0001, colours="f2f1ed e0d0ae 131313")
 def barcodes(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """Bar codes, matrix codes and labels of all sizes."""
     image, _ = canvas(size)

@@ -15,7 +15,7 @@ from fsid.assets.patterns import axes, cells, edge, level, noise, scratches, war
     colours=(
         "8f2f3a c4616a f0c0b8",
         "2a3f6f 5f7fb5 c9d4e6",
-        "c9b48f e6d8bb f7f1e0",
+        "c2ae8a ded1b4 efe9d8",
         "3a3a3f 66666e a8a8b0",
     ),
 )
