@@ -174,6 +174,18 @@ def test_ribbons_go_over_and_under_across_the_border_as_inside(variant):
 
 
 @pytest.mark.parametrize("variant", range(MATERIAL_VARIANTS))
+def test_every_second_cane_passes_before_a_stake(variant):
+    """And behind the next, so that each stake can be seen in half of the rows."""
+    stakes, canes = (14, 20, 10, 16)[variant], (40, 60, 28, 18)[variant]
+    height = draw_material("wicker", variant, 1024).height
+    v, u = ((np.arange(n) + 0.5) * 1024 / n for n in (canes, stakes))
+    before = height[np.ix_(v.astype(int), u.astype(int))] > 0.75
+    assert before.mean() == pytest.approx(0.5, abs=0.1)
+    assert (before[1:] != before[:-1]).mean() > 0.8
+    assert (before[:, 1:] != before[:, :-1]).mean() > 0.8
+
+
+@pytest.mark.parametrize("variant", range(MATERIAL_VARIANTS))
 def test_wallpaper_has_one_lattice_across_the_border(variant):
     """It lies on itself where it is moved by a column and dropped by half a row."""
     flowers = draw_material("wallpaper", variant, 256).pattern

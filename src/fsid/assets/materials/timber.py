@@ -154,7 +154,7 @@ def wicker(rng: np.random.Generator, variant: int, size: int) -> Layers:
     wobble = noise(rng, size, 1.6, low=2, high=30) * np.float32(0.035)
     y = v * canes + wobble
     j = np.floor(y).astype(int) % canes
-    wave = np.cos(np.pi * (u * stakes + (j % 2)))
+    wave = np.cos(np.pi * (u * stakes + 0.5 + j % 2))  # highest and lowest at stakes
     across = y % 1 - 0.5
     cane = np.sqrt(np.clip(1 - (2.05 * across) ** 2, 0, 1))
     height = cane * (0.55 + 0.35 * wave)
