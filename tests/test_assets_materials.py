@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.ndimage import median_filter
 
 from fsid.assets import (
     MATERIAL_VARIANTS,
@@ -143,6 +144,16 @@ def test_a_material_is_the_same_picture_at_every_size(baked, family):
 def test_a_tile_of_1024_texels_is_that_of_128_seen_sharper(baked, family):
     large = brightness(draw_material(family, 2, 1024))
     assert likeness(brightness(baked[family, 2]), large, SIZE // 4) > 0.9
+
+
+@pytest.mark.parametrize(("family", "name", "count"), [("comic", "detail", 205), ("painting", "height", 128)])
+def test_dots_and_threads_are_as_many_at_every_size(family, name, count):
+    """Of all periods from 30 per tile on, theirs stands out most from those beside it."""
+    for size in (512, 1024):
+        field = getattr(draw_material(family, 0, size), name)
+        power = np.abs(np.fft.rfft(field, axis=1)).mean(0)
+        beside = median_filter(power, 25)
+        assert 30 + int((power / beside)[30:250].argmax()) == pytest.approx(count, abs=1), size
 
 
 @pytest.mark.parametrize("layer", material_layers())

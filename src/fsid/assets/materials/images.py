@@ -119,7 +119,7 @@ def painting(rng: np.random.Generator, variant: int, size: int) -> Layers:
     du, dv = np.where(turn, 0.014, 0.003) * strokes, np.where(turn, 0.003, 0.014) * other
     smeared = np.stack([warp(picture[..., k], du, dv) for k in range(3)], axis=-1)
     u, v = axes(size)
-    threads = np.cos(2 * np.pi * size / 8 * u) * np.cos(2 * np.pi * size / 8 * v)
+    threads = np.cos(2 * np.pi * 128 * u) * np.cos(2 * np.pi * 128 * v) * (size > 256)  # finer ones are grey
     rgb = smeared * (1 + 0.05 * bristle + 0.015 * threads)[..., None]
     layers = pictured(np.clip(rgb, 0, 1))
     return layers._replace(
@@ -157,7 +157,7 @@ def comic(rng: np.random.Generator, variant: int, size: int) -> Layers:
     """Panels with flat colours, black outlines, dot screens and lettering."""
     image, draw = canvas(size, (248, 246, 235))
     wide, rows = 2 * size, (2, 3, 3, 4)[variant]
-    gap, pen = 0.006 * wide, max(1, round(wide / 250))
+    gap, pen, pitch = 0.006 * wide, max(1, round(wide / 250)), wide / 204.8
     for row in range(rows):
         cuts = np.r_[0, np.cumsum(rng.dirichlet(np.full(rng.integers(1, 4), 4.0)))] * wide
         for left, right in pairwise(cuts):
@@ -169,12 +169,14 @@ def comic(rng: np.random.Generator, variant: int, size: int) -> Layers:
             flat = np.round(picture * 4) / 4
             small = Image.fromarray(np.uint8(flat * 255))
             panel = np.asarray(small.resize((across, high), Image.Resampling.NEAREST))
-            y, x = np.mgrid[0:high, 0:across]
-            dots = ((x % 10 - 5) ** 2 + (y % 10 - 5) ** 2 < 9)[..., None]
+            y, x = (np.mgrid[0:high, 0:across] + 0.5) % pitch - pitch / 2
+            dots = np.clip(0.3 * pitch + 0.5 - np.hypot(x, y), 0, 1)[..., None]
+            if pitch < 4:  # two texels: dots that are finer are grey
+                dots = np.full_like(dots, np.pi * 0.3**2)
             drawn = (np.abs(panel - np.roll(panel, (pen // 2 + 1,) * 2, (0, 1)).astype(float)) > 30).any(
                 -1, keepdims=True
             )
-            shown = np.where(drawn, 12.0, np.where(dots, panel * 0.8, panel)) / 255
+            shown = np.where(drawn, 12.0, panel * (1 - 0.2 * dots)) / 255
             _paste(image, shown, box[0], box[1])
             draw.rectangle(box, outline=(10, 10, 10), width=pen)
             balloon = (box[0] + gap, box[1] + gap, box[0] + 0.6 * across, box[1] + 0.3 * high)
