@@ -180,7 +180,9 @@ def test_a_killed_training_ends_with_the_same_bits(tmp_path: Path) -> None:
     killed = subprocess.run([sys.executable, "-c", KILLED_TRAINING, *arguments], check=False)
     assert killed.returncode == -signal.SIGKILL
     assert not (tmp_path / "b" / "last.safetensors").exists()
+    (tmp_path / "b" / "checkpoint.safetensors.1234.part").write_bytes(b"as if it was killed while it wrote")
     resumed = train(folder, tmp_path / "b", config, resume=True, quiet=True)
+    assert not list((tmp_path / "b").glob("*.part"))
     assert [row["step"] for row in json.loads((tmp_path / "b" / "validation.json").read_text())] == [3, 6, 8]
     for name in (
         "model.safetensors",

@@ -35,7 +35,7 @@ from fsid.evaluate import (
 from fsid.evaluate.compare import Comparison, Crops, detailed_window, summarise
 from fsid.evaluate.comparison_report import comparison_sections
 from fsid.evaluate.metrics import ssim
-from fsid.evaluate.models import model_names
+from fsid.evaluate.models import evaluate_models, model_names
 from fsid.evaluate.report import METRICS, level_label, method_label, write_report
 from fsid.evaluate.results import (
     MOST_DB,
@@ -48,7 +48,7 @@ from fsid.evaluate.results import (
 )
 from fsid.evaluate.testset import TestImage, TestSet, staged, write_testset
 from fsid.files import write_atomically
-from fsid.sensor import Raw, develop, read_raw, write_dng
+from fsid.sensor import NoiseLevel, Raw, develop, read_raw, write_dng
 from fsid.sensor.gain_maps import shading_gains
 from fsid.sensor.metadata import OPCODES_2, Metadata, exposure_metadata
 from fsid.sensor.tiff import Tag
@@ -381,6 +381,19 @@ def test_a_capture_that_a_method_refuses_is_named(small_set: Path, tmp_path: Pat
     write_dng(capture, dataclasses.replace(read_raw(capture), noise=None))
     with pytest.raises(FsidError, match=rf"{capture}: classical: .* the noise level is unknown"):
         compare(tmp_path / "set", [NOISY, CLASSICAL])
+
+
+@pytest.mark.parametrize("noise", [None, NoiseLevel((0.0,) * 4, (0.0,) * 4)])
+def test_a_capture_without_noise_is_named_before_anything_is_measured(small_set: Path, tmp_path: Path, noise):
+    """Zeros are no noise that any denoiser could take away: the table said that none does anything."""
+    shutil.copytree(small_set, tmp_path / "set")
+    testset = read_testset(small_set)
+    last = testset.noisy(tmp_path / "set", testset.images[-1], testset.levels[-1])
+    write_dng(last, dataclasses.replace(read_raw(last), noise=noise))
+    measured: list[int] = []
+    with pytest.raises(FsidError, match=f"^{last}: states no noise"):
+        evaluate_models(tmp_path / "set", (), progress=lambda done, total: measured.append(done))
+    assert not measured
 
 
 def test_a_broken_capture_is_named_before_anything_is_measured(small_set: Path, tmp_path: Path):

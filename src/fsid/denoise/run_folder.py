@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -18,6 +19,8 @@ from fsid.sensor.profiles import profiles_digest
 from fsid.yaml_json import read_yaml
 
 CONFIG_FILE = "config.yaml"
+_PART = re.compile(r".+\.(yaml|json|csv|png|safetensors)\.\d+\.part")
+"""Names that `fsid.files.write_together` gives."""
 _WITHOUT_EFFECT = {"checkpoint_every", "loader_processes", "tensorboard"}
 """Settings that change no bit of a network: a run goes on with others."""
 
@@ -41,6 +44,13 @@ def _begun_with(file: Path) -> TrainConfig:
     """The settings in the file of a run; before there was `shrink`, images were drawn as they are."""
     there = load_settings(TrainConfig, file)
     return there if "shrink" in read_yaml(file) else replace(there, shrink=(1,))
+
+
+def remove_parts(run_dir: Path) -> None:
+    """Remove what a run that was killed while it wrote has left, a checkpoint of 1.9 GB at worst."""
+    for part in run_dir.glob("*.part"):
+        if _PART.fullmatch(part.name):
+            part.unlink(missing_ok=True)
 
 
 def prepare_run(

@@ -35,7 +35,13 @@ from fsid.denoise.machine_limits import machine_limits
 from fsid.denoise.model import MODEL_FILE, Denoiser
 from fsid.denoise.progress_line import ProgressLine
 from fsid.denoise.raw_denoiser import RawDenoiser
-from fsid.denoise.run_folder import CONFIG_FILE, held_out_as_begun, prepare_run, sizes_as_begun
+from fsid.denoise.run_folder import (
+    CONFIG_FILE,
+    held_out_as_begun,
+    prepare_run,
+    remove_parts,
+    sizes_as_begun,
+)
 from fsid.denoise.run_output import RunOutput, card_of
 from fsid.denoise.stabilise import stabilise
 from fsid.denoise.train_config import TrainConfig
@@ -117,7 +123,9 @@ def train(
     shown = is_main and not quiet and progress is None
     if shown and config.held_out and not kept:
         _note_nothing_held_out(data_dir)
-    with held(run_dir, "another fsid train is at work in it") if is_main else nullcontext():
+    with held(run_dir, "another fsid train is at work in it") if is_main else nullcontext() as alone:
+        if alone:
+            remove_parts(run_dir)
         with accelerator.main_process_first():
             prepare_run(data_dir, run_dir, config, initial, kept)
         torch.manual_seed(config.seed)

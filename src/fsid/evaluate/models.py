@@ -15,6 +15,7 @@ from fsid.evaluate.testset import TestSet, read_testset
 from fsid.files import make_folder, paths_of
 from fsid.plurals import counted
 from fsid.sensor import read_raw
+from fsid.sensor.blind import stated_noise
 
 if TYPE_CHECKING:
     from fsid.denoise import Network
@@ -67,13 +68,19 @@ def evaluate_models(
 
     ensemble: of each model, as for `denoise_raw`; where it is not 1 their names say so. note: told in one
     line of each model at which levels the test set holds more noise than it knows, and which results have no
-    error.
+    error. FsidError also where a capture states no noise, or zeros.
     """
     models = paths_of(models)
     made = read_testset(testset)
     levels = made.levels
     copies = "" if ensemble == 1 else f" (mean of {ensemble})"
     methods = [NOISY, CLASSICAL]
+    for path in made.captures(testset):  # before the first is denoised: all would be lost
+        if stated_noise(read_raw(path)) is None:
+            raise FsidError(
+                f"{path}: states no noise, which every denoiser needs; write its NoiseProfile, in Python: "
+                "write_dng(path, replace(raw, noise=profile.level(iso)))"
+            )
     noisiest = {level: _variance_at(testset, made, level) for level in levels} if models else {}
     for path, name in zip(models, model_names(models), strict=True):
         method = model_method(path, f"{name}{copies}", ensemble=ensemble)
