@@ -230,3 +230,14 @@ def test_a_mosaic_in_memory_is_that_of_its_file(tmp_path):
             raw_from_dn(wrong, **camera)
     with pytest.raises(FsidError, match="far beyond the white level 1023"):
         raw_from_dn(dn, cfa="BGGR", black_level=256, white_level=1023)
+
+
+@pytest.mark.parametrize(
+    ("bits", "advice"),
+    [(10, "packed, 10 bits a pixel"), (12, "packed, 12 bits"), (11, "correct width and height")],
+)
+def test_packed_pixels_are_told_from_a_wrong_size(tmp_path, bits, advice):
+    path = tmp_path / "frame.raw"
+    path.write_bytes(bytes(64 * 48 * bits // 8))
+    with pytest.raises(FsidError, match=f"{path.name}: .*{advice}"):
+        read_mosaic(path, cfa="RGGB", black_level=64, white_level=1023, width=64, height=48)

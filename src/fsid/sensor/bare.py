@@ -273,8 +273,12 @@ def _read_headerless(path: Path, width: int | None, height: int | None) -> np.nd
         raise FsidError(f"{path}: a headerless mosaic needs its width and height")
     expected, found = 2 * width * height, path.stat().st_size
     if found != expected:
+        bits = 8 * found / (width * height)
+        advice = (
+            f"they are packed, {bits:g} bits a pixel: unpack them to 16 first" if bits in (10, 12, 14) else ""
+        )
         raise FsidError(
             f"{path}: {width}x{height} uint16 pixels are {expected} bytes, the file has {found}; "
-            f"correct width and height"
+            f"{advice or 'correct width and height'}"
         )
     return np.fromfile(path, dtype="<u2").reshape(height, width)
