@@ -84,12 +84,12 @@ def testset(
             made, found = burst_testset(folders[0], output, camera=camera, progress=progress, **given)
         print_table(_table(found))
     else:
-        note_unread(folders)
         isos = iso if iso or lux else DEFAULT_ISOS
         with progress_bar("photographs", "photographs", quiet=quiet) as progress:
             made = photo_testset(
                 folders, output, camera=camera, isos=isos, luxes=lux, progress=progress, **given
             )
+        note_unread(folders)  # not before: what is wrong is one line
     if camera:
         note_files(camera, made.captures(output))
 
