@@ -33,7 +33,7 @@ SAMPLES_PER_WORKER = 320
 """After so many a worker is replaced, so that whatever a driver leaks stays small."""
 
 _MOST_PAIRS = 100_000_000
-"""Keys have eight digits, and shards that are missing are listed, half a gigabyte for so many."""
+"""Keys have eight digits."""
 
 DEAD_AFTER_S = 86400
 """Where there are no locks, a file that was not written to for so long is of a process that died."""

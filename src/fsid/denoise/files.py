@@ -235,35 +235,33 @@ def denoise_folder(
     is_new = not target.exists()
     make_folder(target)
     noises: dict[Path, Noise] = {}
-    refusal = ""
-    for done, (source, out) in enumerate(zip(paths, targets, strict=True)):
-        try:
-            noises[source] = denoise_file(
-                source,
-                out,
-                model,
-                profile=profile,
-                iso=iso,
-                strength=strength,
-                ensemble=ensemble,
-                mend_hot_pixels=mend_hot_pixels,
-                layout=layout,
-            )
-        except DiskError as error:  # before the others are denoised for nothing
-            where = f"{len(paths) - done} of {len(paths)} files are left, --skip-existing goes on from there"
-            refusal = f"{error}; {where}"
-            break
-        except FsidError as error:
-            failed(error)
-        else:
-            denoised(source, noises[source])
-        if progress is not None:
-            progress(done + 1, len(paths))
-    if is_new and paths and not noises:
-        with contextlib.suppress(OSError):  # something else came to lie in it
-            target.rmdir()
-    if refusal:
-        raise FsidError(refusal)
+    try:
+        for done, (source, out) in enumerate(zip(paths, targets, strict=True)):
+            try:
+                noises[source] = denoise_file(
+                    source,
+                    out,
+                    model,
+                    profile=profile,
+                    iso=iso,
+                    strength=strength,
+                    ensemble=ensemble,
+                    mend_hot_pixels=mend_hot_pixels,
+                    layout=layout,
+                )
+            except DiskError as error:  # before the others are denoised for nothing
+                where = f"{len(paths) - done} of {len(paths)} files are left"
+                raise FsidError(f"{error}; {where}, --skip-existing goes on from there") from None
+            except FsidError as error:
+                failed(error)
+            else:
+                denoised(source, noises[source])
+            if progress is not None:
+                progress(done + 1, len(paths))
+    finally:
+        if is_new and paths and not noises:
+            with contextlib.suppress(OSError):  # something else came to lie in it
+                target.rmdir()
     if failures := len(paths) - len(noises):
         raise FsidError(f"{failures} of {len(paths)} files could not be denoised")
     return noises

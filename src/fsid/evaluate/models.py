@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 from fsid.errors import FsidError
 from fsid.evaluate.compare import CLASSICAL, NOISY, Comparison, Method, compare
 from fsid.evaluate.results import perfect_note, write_images, write_results
-from fsid.evaluate.testset import TestSet, read_testset
+from fsid.evaluate.testset import read_testset
 from fsid.files import make_folder, paths_of
 from fsid.plurals import counted
-from fsid.sensor import read_raw
+from fsid.sensor import NoiseLevel, read_raw
 from fsid.sensor.blind import stated_noise
 
 if TYPE_CHECKING:
@@ -74,31 +74,38 @@ def evaluate_models(
     made = read_testset(testset)
     levels = made.levels
     copies = "" if ensemble == 1 else f" (mean of {ensemble})"
-    methods = [NOISY, CLASSICAL]
-    for path in made.captures(testset):  # before the first is denoised: all would be lost
-        if stated_noise(read_raw(path)) is None:
-            raise FsidError(
-                f"{path}: states no noise, which every denoiser needs; write its NoiseProfile, in Python: "
-                "write_dng(path, replace(raw, noise=profile.level(iso)))"
-            )
-    noisiest = {level: _variance_at(testset, made, level) for level in levels} if models else {}
-    for path, name in zip(models, model_names(models), strict=True):
-        method = model_method(path, f"{name}{copies}", ensemble=ensemble)
-        methods.append(method)
-        if beyond := [level for level, variance in noisiest.items() if variance > method.most_noise]:
+    methods = [
+        model_method(path, f"{name}{copies}", ensemble=ensemble)
+        for path, name in zip(models, model_names(models), strict=True)
+    ]
+    noises = {path: _stated_noise(path) for path in made.captures(testset)}  # before the first is denoised
+    firsts = {level: noises[made.noisy(testset, made.images[0], level)] for level in levels}
+    for method in methods:
+        if beyond := [level for level in levels if _is_beyond(method, firsts[level])]:
             note(f"{method.name}: at {', '.join(beyond)} there is more noise than it knows")
-    comparison = compare(testset, methods, crop_levels=levels[len(levels) // 2 :][:1], progress=progress)
+    comparison = compare(
+        testset, [NOISY, CLASSICAL, *methods], crop_levels=levels[len(levels) // 2 :][:1], progress=progress
+    )
     if perfect := perfect_note(comparison.images):
         note(perfect)
     return comparison
 
 
-def _variance_at(testset: str | Path, made: TestSet, level: str) -> float:
-    """At mid-grey, of the first capture at a level; 0 where it does not state its noise."""
+def _stated_noise(capture: Path) -> NoiseLevel:
+    noise = stated_noise(read_raw(capture))
+    if noise is None:
+        raise FsidError(
+            f"{capture}: states no noise, which every denoiser needs; write its NoiseProfile, in Python: "
+            "write_dng(path, replace(raw, noise=profile.level(iso)))"
+        )
+    return noise
+
+
+def _is_beyond(method: Method, noise: NoiseLevel) -> bool:
+    """Whether it is more, at mid-grey, than the method knows."""
     from fsid.denoise.denoise import variance_at_grey
 
-    raw = read_raw(made.noisy(testset, made.images[0], level, 0))
-    return variance_at_grey(raw.noise) if raw.noise else 0.0
+    return variance_at_grey(noise) > method.most_noise
 
 
 def write_comparison(comparison: Comparison, testset: str | Path, out: str | Path) -> None:

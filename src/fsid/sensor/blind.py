@@ -207,7 +207,7 @@ def _first_line(blocks: _Blocks, floor: float) -> np.ndarray:
 def _pools(blocks: _Blocks, line: np.ndarray) -> _Pools:
     expected = line[0] * blocks.mean.clip(min=0) + line[1]
     expected *= _left((blocks.mean - blocks.lowest) / np.sqrt(expected))
-    parts = _like(blocks.mean, blocks.low / expected, line)
+    parts = _parts_of_like_mean(blocks.mean, blocks.low / expected, line)
     mean = np.array([blocks.mean[part].mean() for part in parts])
     variance = np.array(
         [np.median(blocks.high[part] / expected[part]) * expected[part].mean() for part in parts]
@@ -217,9 +217,11 @@ def _pools(blocks: _Blocks, line: np.ndarray) -> _Pools:
     return _Pools(light, noise, freedom * (1 - clipped) ** _SEEN)
 
 
-def _like(mean: np.ndarray, roughness: np.ndarray, line: np.ndarray) -> list[np.ndarray]:
-    """Indices of smooth blocks of like mean, pool by pool, from dark to light.
+def _parts_of_like_mean(mean: np.ndarray, roughness: np.ndarray, line: np.ndarray) -> list[np.ndarray]:
+    """Indices of smooth blocks, pool by pool, from dark to light.
 
+    mean, roughness: (n,), of blocks: normalised light, and energy of low frequencies over that of noise.
+    line: (2,) k and sigma2, normalised.
     Every part of the range has its own pool: else the black of a picture that is full of it speaks for its
     light too, in which it says nothing of k. No part is narrower than `_PART_WIDTH` sigmas of noise: blocks
     of the same light would be sorted by their noise, and show k = 0. Where smooth blocks are of one light,

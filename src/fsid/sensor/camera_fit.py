@@ -20,19 +20,12 @@ import numpy as np
 from fsid.errors import FsidError
 from fsid.files import paths_of
 from fsid.plurals import counted
-from fsid.sensor.calibrate import (
-    NoiseFit,
-    Samples,
-    black_too_low_dn,
-    departure,
-    fit_samples,
-    pool,
-    pool_dark,
-)
+from fsid.sensor.calibrate import NoiseFit, black_too_low_dn, departure, fit_samples
 from fsid.sensor.camera_profile import CameraProfile
 from fsid.sensor.defects import defective
 from fsid.sensor.fitted_profile import profile_of, site_blacks
 from fsid.sensor.frames import Frame, FrameSet, Layout, bursts, find_frames
+from fsid.sensor.pools import Samples, pool, pool_dark
 from fsid.sensor.temporal import TemporalStatistics
 from fsid.sensor.terms_fit import CUT_OFF, DarkFinding, dark_finding, fit_terms, prnu_of, shortest_dark
 
@@ -294,22 +287,7 @@ def _notes(reader: _Reader, isos: Sequence[float], fits: Sequence[NoiseFit]) -> 
     for stated, measured, path in reader.blacks:
         source = "--black-level" if reader.found.camera.bare else "the files' black level"
         yield f"{path}: dark frames have a mean of {measured:.1f} DN, {source} is {stated}, which is kept"
-    sigma2_dn = np.array([fit.sigma2_dn for fit in fits])
-    black = site_blacks(np.array([fit.black for fit in fits]), sigma2_dn)
-    off_dn = float(np.abs(black - round(float(black.mean()))).max())
-    if reader.found.camera.bare and max(np.ptp(black), 2 * off_dn) > apart_dn(sigma2_dn):
-        rounded = [f"{round(level, 1):g}" for level in black.tolist()]
-        levels = ",".join(rounded if len(set(rounded)) > 1 else rounded[:1])
-        yield (
-            f"the black level is {levels} and not one whole number: denoise such mosaics with --black-level "
-            f"{levels}"
-        )
-    step_dn = reader.found.step_dn
-    if step_dn > 1 and sigma2_dn.min() < UNRESOLVED * step_dn**2:
-        yield (
-            f"all DN are multiples of {step_dn}, and read noise is hardly larger: sigma2 and the errors are "
-            f"wrong; give the integers, and the levels, divided by {step_dn}"
-        )
+    yield from _notes_on_integers(reader.found, fits)
     for iso in sorted(set(reader.cut_off)):
         yield f"ISO {iso:g}: dark noise reaches DN 0 and is cut off; corrected as far as it is Gaussian"
     for iso, fit in zip(isos, fits, strict=True):
@@ -335,3 +313,22 @@ def _notes(reader: _Reader, isos: Sequence[float], fits: Sequence[NoiseFit]) -> 
                     f"ISO {iso:g}: sigma2 is uncertain by {100 * sigma2_error:.0f} %; take dark frames, or "
                     f"more of them"
                 )
+
+
+def _notes_on_integers(found: FrameSet, fits: Sequence[NoiseFit]) -> Iterator[str]:
+    """What black level the stored integers have, and whether they are too coarse for their noise."""
+    sigma2_dn = np.array([fit.sigma2_dn for fit in fits])
+    black = site_blacks(np.array([fit.black for fit in fits]), sigma2_dn)
+    off_dn = float(np.abs(black - round(float(black.mean()))).max())
+    if found.camera.bare and max(np.ptp(black), 2 * off_dn) > apart_dn(sigma2_dn):
+        rounded = [f"{round(level, 1):g}" for level in black.tolist()]
+        levels = ",".join(rounded if len(set(rounded)) > 1 else rounded[:1])
+        yield (
+            f"the black level is {levels} and not one whole number: denoise such mosaics with --black-level "
+            f"{levels}"
+        )
+    if found.step_dn > 1 and sigma2_dn.min() < UNRESOLVED * found.step_dn**2:
+        yield (
+            f"all DN are multiples of {found.step_dn}, and read noise is hardly larger: k, sigma2 and their "
+            f"errors are wrong; give the integers, and the levels, divided by {found.step_dn}"
+        )

@@ -233,7 +233,8 @@ def d65_matrix(tags: Tags) -> np.ndarray | None:
     """(3, 3) XYZ -> camera matrix of the illuminant nearest to D65 that `tags` offer one for, else None.
 
     AnalogBalance CameraCalibration ColorMatrix: that of the model, and what this unit of it differs by (DNG
-    1.7.1, chapter 6; a calibration counts where its signature is that of the profile).
+    specification, "Mapping Camera Color Space to CIE XYZ Space"). A calibration counts where its signature is
+    that of the profile.
     """
     first = (_number(tags, ILLUMINANT_1, D65), COLOUR_MATRIX_1, CALIBRATION_1)
     second = (_number(tags, ILLUMINANT_2, 0), COLOUR_MATRIX_2, CALIBRATION_2)

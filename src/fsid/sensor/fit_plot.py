@@ -18,10 +18,11 @@ from matplotlib.figure import Figure
 from fsid.errors import FsidError
 from fsid.evenly_spaced import spaced
 from fsid.files import check_output, same_files
-from fsid.sensor.calibrate import LINEAR_SHARE, NoiseFit
+from fsid.sensor.calibrate import NoiseFit
 from fsid.sensor.camera_fit import Calibration
 from fsid.sensor.camera_profile import MONO, CameraProfile
 from fsid.sensor.mosaic import SITES
+from fsid.sensor.pools import LINEAR_SHARE
 
 COLOURS = ("tab:red", "tab:green", "tab:olive", "tab:blue")
 PICTURES = (".png", ".pdf", ".svg")

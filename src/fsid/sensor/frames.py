@@ -92,7 +92,7 @@ class Frame:
 class FrameSet:
     """The frames and dark frames of one camera. date: of the first frame, "" where unknown.
 
-    step_dn: all integers are multiples of it: 16 where 12 bits are the upper ones of 16.
+    step_dn: all integers are multiples of it: 16 where 12 bits are the upper ones of 16; 0 if all are 0.
     """
 
     camera: Camera
@@ -100,7 +100,7 @@ class FrameSet:
     dark: tuple[Frame, ...]
     date: str
     notes: tuple[str, ...]
-    step_dn: int = 1
+    step_dn: int
 
     def read(self, frame: Frame, layout: Layout) -> np.ndarray:
         """DN (H, W) of `frame`; FsidError where it is of another camera or another mode.
@@ -145,11 +145,13 @@ def find_frames(paths: Sequence[Path], dark: Sequence[Path], layout: Layout) -> 
         raise FsidError(f"--iso {layout.iso:g}: must be a number above 0")
     bare = paths[0].suffix.lower() in BARE_SUFFIXES
     others = [path for path in (*paths, *dark) if (path.suffix.lower() in BARE_SUFFIXES) != bare]
-    for path in (*paths, *dark) if others else ():
-        if path.suffix.lower() not in RAW_SUFFIXES.union(BARE_SUFFIXES):
-            raise FsidError(f"{path}: is neither a RAW file nor a bare mosaic; leave it out")
-    for path in others:
-        raise FsidError(f"{path}: RAW files and bare mosaics in one calibration; give frames of one kind")
+    if others:
+        known = RAW_SUFFIXES.union(BARE_SUFFIXES)
+        for path in (*paths, *dark):
+            if path.suffix.lower() not in known:
+                raise FsidError(f"{path}: is neither a RAW file nor a bare mosaic; leave it out")
+        advice = "RAW files and bare mosaics in one calibration; give frames of one kind"
+        raise FsidError(f"{others[0]}: {advice}")
     if bare:
         return _bare_frames(paths, dark, layout)
     return _raw_frames(paths, dark, layout)
@@ -269,7 +271,7 @@ def _bare_frames(paths: Sequence[Path], dark: Sequence[Path], layout: Layout) ->
         check_levels(stated, white, str(paths[0]))
     camera = Camera("", cfa, level, white, bare=True, shape=shape, black=black)
     found, notes = tuple(frames), [*notes, *assumed]
-    return FrameSet(camera, found[: len(paths)], found[len(paths) :], "", tuple(notes), max(step_dn, 1))
+    return FrameSet(camera, found[: len(paths)], found[len(paths) :], "", tuple(notes), step_dn)
 
 
 def _with_iso(frames: list[Frame], given: float | None) -> tuple[list[Frame], tuple[str, ...]]:

@@ -23,9 +23,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fsid.sensor.calibrate import RESOLVED_DN2
 from fsid.sensor.defects import GAUSS_MAD, defective
 from fsid.sensor.mosaic import TILE
+from fsid.sensor.pools import RESOLVED_DN2
 from fsid.sensor.quantise import ROUNDING_DN2
 from fsid.sensor.temporal import TemporalStatistics
 from fsid.sensor.terms import NoiseTerms
