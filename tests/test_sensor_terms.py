@@ -161,6 +161,24 @@ def test_switching_one_term_leaves_the_others_noise():
     assert np.max(np.abs(plain - banded)) < 1e-3
 
 
+@pytest.mark.parametrize("terms", [NoiseTerms(), NoiseTerms(row=0.1)])
+def test_noise_goes_by_the_state_of_the_generator_and_not_by_its_seed(terms):
+    """Streams of one seed, far apart, had the same noise; a state that was saved and restored had another."""
+
+    def noise(rng: np.random.Generator) -> np.ndarray:
+        return add_noise_terms(rng, flat(0.1, 16), LEVEL, terms).mosaic
+
+    def far() -> np.random.Generator:
+        return np.random.Generator(np.random.PCG64(3).advance(10**12))
+
+    rng = far()
+    state = rng.bit_generator.state
+    assert not np.array_equal(noise(np.random.default_rng(3)), noise(far()))
+    first = noise(rng)
+    rng.bit_generator.state = state
+    assert np.array_equal(first, noise(rng))
+
+
 def test_terms_survive_the_file_and_unknown_ones_are_named(tmp_path):
     profile = replace(load_profile("pixel6"), terms=NoiseTerms(poisson=True, row=0.05))
     save_profile(tmp_path / "p.yaml", profile)
@@ -295,7 +313,8 @@ def test_banding_keeps_the_variance_of_every_site_and_is_found_again(rng):
     np.testing.assert_allclose(measured, level.sigma2, rtol=0.03)
     dark, _ = _dark_and_flat(rng, level, terms, (0.1,) * 4)
     found = dark_finding(dark, 800, 0.01).terms
-    assert (found.row, found.column) == (pytest.approx(0.2, rel=0.07), pytest.approx(0.1, rel=0.07))
+    # of 30 frames the standard errors are 5 and 7 %
+    assert (found.row, found.column) == (pytest.approx(0.2, rel=0.15), pytest.approx(0.1, rel=0.2))
 
 
 @pytest.mark.parametrize("share", [0.0, 0.002])

@@ -25,9 +25,10 @@ import numpy as np
 
 from fsid.config import check_fields
 from fsid.errors import FsidError
+from fsid.sensor.arrays import check_generator
 from fsid.sensor.mosaic import site_offsets
 from fsid.sensor.poisson import poisson
-from fsid.sensor.raw import NoiseLevel, Raw
+from fsid.sensor.raw import NoiseLevel, Raw, check_level
 
 
 @dataclass(frozen=True)
@@ -75,14 +76,16 @@ def add_noise_terms(
     FsidError for one below 0, for a level that is none, and counts of electrons with k = 0, which says that
     they are infinitely many.
     """
-    level.check()
+    check_generator(rng)
+    check_level(level)
     if not 0 <= exposure_s < math.inf:
         raise FsidError(f"exposure_s {exposure_s}: must be finite and not negative")
     if unit < 0:
         raise FsidError(f"unit {unit}: must not be negative")
     if terms.poisson and min(level.k) == 0:
         raise FsidError(f"poisson: {level} has a site without shot noise, k = 0; switch the term off")
-    shot, pixels, rows, columns, level_drift = rng.spawn(5)
+    # not rng.spawn, which knows nothing of how far the generator is
+    shot, pixels, rows, columns, level_drift = map(np.random.default_rng, rng.integers(2**63, size=5))
     shape = raw.mosaic.shape
     k, sigma2 = _site_map(level.k, raw.cfa, shape), _site_map(level.sigma2, raw.cfa, shape)
     light = np.maximum(raw.mosaic, 0)
