@@ -6,6 +6,7 @@ import json
 import os
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 torch = pytest.importorskip("torch")
@@ -14,6 +15,7 @@ from safetensors.torch import save_file  # noqa: E402
 
 from fsid.denoise import ModelCard, NetworkConfig, RawDenoiser, load_denoiser, save_model  # noqa: E402
 from fsid.errors import FsidError  # noqa: E402
+from fsid.sensor import NoiseLevel  # noqa: E402
 
 CARD = ModelCard(NetworkConfig(width=4), patch_px=16, training="3 images of test", details={"steps": 1})
 
@@ -36,6 +38,27 @@ def test_round_trip(tmp_path: Path) -> None:
         for name, tensor in net.state_dict().items():
             assert torch.equal(loaded.net.state_dict()[name], tensor)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["model.json", "model.safetensors"]
+
+
+def test_loading_draws_no_random_number(model_file: Path) -> None:
+    torch.manual_seed(0)
+    before = torch.random.get_rng_state()
+    load_denoiser(model_file)
+    assert torch.equal(before, torch.random.get_rng_state())
+
+
+def test_what_a_notebook_sets_for_its_own_networks_changes_nothing(model_file: Path) -> None:
+    image = np.random.default_rng(0).random((4, 16, 16), np.float32)
+    level = NoiseLevel((1e-3,) * 4, (1e-5,) * 4)
+    before = load_denoiser(model_file).averages(image, level)
+    torch.set_default_dtype(torch.float64)
+    try:
+        loaded = load_denoiser(model_file)
+        with torch.autocast("cpu", torch.bfloat16):
+            assert np.array_equal(loaded.averages(image, level), before)
+            assert loaded.run(image, level, before).dtype == np.float32
+    finally:
+        torch.set_default_dtype(torch.float32)
 
 
 def test_an_untrained_network_is_the_identity() -> None:

@@ -86,14 +86,16 @@ class Denoiser:
     @torch.no_grad()
     def averages(self, patch: np.ndarray, level: NoiseLevel) -> np.ndarray:
         """The averages that channel attention takes over `patch` (4, h, w), one after the other: (n,)."""
-        seen = pooling(self.net, lambda: self.net(*self._inputs(patch, level)))
+        with torch.autocast(self.device.type, enabled=False):
+            seen = pooling(self.net, lambda: self.net(*self._inputs(patch, level)))
         return torch.cat([mean.flatten() for mean in seen] or [torch.zeros(0)]).cpu().numpy()
 
     @torch.no_grad()
     def run(self, tile: np.ndarray, level: NoiseLevel, averages: np.ndarray) -> np.ndarray:
         """The clean estimate (4, h, w) of `tile` with channel attention held at `averages` (n,)."""
         parts = torch.from_numpy(averages).to(self.device).split(list(self.attention_widths))
-        with frozen_pooling(self.net, [part[None, :, None, None] for part in parts]):
+        held = frozen_pooling(self.net, [part[None, :, None, None] for part in parts])
+        with held, torch.autocast(self.device.type, enabled=False):
             return self.net(*self._inputs(tile, level))[0].cpu().numpy()
 
     def _inputs(self, packed: np.ndarray, level: NoiseLevel) -> tuple[Tensor, Tensor, Tensor]:
@@ -147,10 +149,10 @@ def load_denoiser(run_or_file: str | Path | None = None, device: str | torch.dev
     if _CARD not in header:
         raise FsidError(f"{path}: has no FSID model card; give a model that `fsid train` wrote")
     card = parse_card(header[_CARD], str(path))
-    with torch.device("meta"):  # takes no memory, of which a card that lies may ask for any amount
-        check_weights(RawDenoiser(card.network), weights, path)
-    net = RawDenoiser(card.network)
-    net.load_state_dict(weights)
+    with torch.device("meta"):  # draws nothing, and a card that lies may ask for any amount of memory
+        net = RawDenoiser(card.network)
+    check_weights(net, weights, path)
+    net.load_state_dict({name: tensor.float() for name, tensor in weights.items()}, assign=True)
     return Denoiser(net.to(target).eval().requires_grad_(False), card, target)
 
 
