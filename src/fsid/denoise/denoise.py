@@ -27,10 +27,10 @@ import numpy as np
 from fsid.denoise.clipped_noise import drawn_anew, lowest_levels
 from fsid.denoise.ensemble import check_ensemble, self_ensemble
 from fsid.denoise.model import ModelCard
-from fsid.errors import FsidError, check_kind, whole
+from fsid.errors import FsidError, whole
 from fsid.sensor.light import GREY
 from fsid.sensor.mosaic import pack, site_offsets, unpack
-from fsid.sensor.raw import NoiseLevel, Raw, check_raw, four
+from fsid.sensor.raw import NoiseLevel, Raw, check_raw, four, noise_to_remove
 
 MAX_STRENGTH = 100.0
 MAX_TOLD = 0.0036
@@ -79,29 +79,33 @@ def denoise_raw(
     is removed, so that grain is left below 1; above 1 the noise is taken to be that many times as strong, up
     to a variance of `MAX_TOLD`, which smooths more. ensemble: 1, 2, 4 or 8 mirrored and transposed copies
     whose results are averaged, for as many times the time. tile_px: side of a tile in packed pixels, overlap
-    excluded; memory grows with it, the result does not depend on it. progress(done, tiles) is called after
-    each tile. Raises FsidError where `raw` is no `Raw`, the noise level unknown or not physical, the strength
-    below 0 or above `MAX_STRENGTH`, the ensemble another number, the mosaic holds NaN or infinity, or the
-    network makes such.
+    excluded; memory grows with it, the result does not depend on it. progress(done, total) is called after
+    each tile, both in tiles of the first copy.
+    Raises FsidError where `raw` is no `Raw`, the noise level unknown or not physical, the strength below 0 or
+    above `MAX_STRENGTH`, the ensemble another number, the mosaic holds NaN or infinity, or the network makes
+    such.
     """
     check_raw(raw)
     check_network(model)
     check_ensemble(ensemble)
-    level = level if level is not None else raw.noise
-    _check(raw, level, strength, tile_px)
-    assert level is not None
-    stated = level
+    stated = level = noise_to_remove(raw, level)
+    check_strength(level, strength)
+    if whole(tile_px, "tile_px") < 1:
+        raise FsidError(f"tile_px {tile_px}: must be at least 1")
     if strength > 1:
         level = _stronger(level, strength**2)
 
     known = model.card.lowest
     lowest = lowest_levels(raw, known)
     first = int(any(limit is not None for limit in lowest))
+    each = 0
 
     def denoised(mosaic: np.ndarray, cfa: str, level: NoiseLevel, copy: int) -> np.ndarray:
         def told(done: int, tiles: int) -> None:
-            if progress is not None:
-                progress((first + copy) * tiles + done, (first + ensemble) * tiles)
+            nonlocal each
+            each = each or tiles
+            if progress is not None:  # a mirrored copy may have other tiles, being of another pattern
+                progress((first + copy) * each + done * each // tiles, (first + ensemble) * each)
 
         return _denoise_mosaic(mosaic, cfa, model, level, tile_px, told)
 
@@ -136,19 +140,6 @@ def check_network(model: object) -> None:
     """FsidError for the name of a network, or a function."""
     if not hasattr(model, "averages"):
         raise FsidError(f"model: a {type(model).__name__} is no network: give what load_model returns")
-
-
-def _check(raw: Raw, level: NoiseLevel | None, strength: float, tile_px: int) -> None:
-    if level is None:
-        raise FsidError(
-            "the noise level of this RAW is unknown: give a profile and an ISO (--profile, --iso)"
-        )
-    check_kind(level, NoiseLevel, "that of a profile is profile.level(iso)")
-    check_strength(level, strength)
-    if not np.all(np.isfinite(raw.mosaic)):
-        raise FsidError("this RAW holds NaN or infinity; read it again from its file")
-    if whole(tile_px, "tile_px") < 1:
-        raise FsidError(f"tile_px {tile_px}: must be at least 1")
 
 
 def check_strength(level: NoiseLevel | None, strength: float) -> None:

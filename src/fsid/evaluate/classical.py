@@ -18,8 +18,8 @@ from importlib.util import find_spec
 import numpy as np
 from skimage.restoration import denoise_nl_means
 
-from fsid.errors import FsidError
 from fsid.sensor import NoiseLevel, Raw, pack, unpack
+from fsid.sensor.raw import check_raw, noise_to_remove
 
 # The best RAW PSNR over ISO 800 to 6400 on photographs, so that the rival is at its best.
 STRENGTH = 0.5
@@ -31,11 +31,11 @@ HADAMARD = np.array([[1, 1, 1, 1], [1, 1, -1, -1], [1, -1, -1, 1], [1, -1, 1, -1
 def denoise_classical(raw: Raw, level: NoiseLevel | None = None) -> Raw:
     """Denoise a RAW by BM3D, or else non-local means, in the variance-stabilised domain.
 
-    level: the noise; by default that of the file. FsidError where neither is known.
+    level: the noise; by default that of the file. FsidError where `raw` is no `Raw` or holds NaN or infinity,
+    and where the noise is unknown or not physical.
     """
-    level = level or raw.noise
-    if level is None:
-        raise FsidError(f"{raw.camera}: the noise level is unknown, give a profile and an ISO")
+    check_raw(raw)
+    level = noise_to_remove(raw, level)
     k = np.maximum(np.asarray(level.k, np.float32), 1e-8)[:, None, None]
     s2 = np.asarray(level.sigma2, np.float32)[:, None, None] / k**2
     stable = _anscombe(pack(raw.mosaic, raw.cfa) / k, s2)

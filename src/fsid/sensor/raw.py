@@ -58,7 +58,8 @@ class NoiseLevel:
 class Raw:
     """A Bayer image and its calibration.
 
-    mosaic: (H, W) float32, normalised x, H and W even. cfa: 2x2 pattern read row by row, e.g. "GBRG".
+    mosaic: (H, W), normalised x, H and W even; kept as float32.
+    cfa: 2x2 pattern read row by row, e.g. "GBRG".
     black_level, white_level: DN, one pair for all sites.
     white_balance: gains (r, g, b) with g = 1 that make a grey surface grey in camera RGB
     (the inverse of DNG `AsShotNeutral`).
@@ -87,6 +88,7 @@ class Raw:
         check_even(self.mosaic.shape)
         if self.mosaic.dtype.kind != "f":
             raise FsidError(f"the mosaic holds {self.mosaic.dtype}; give x = (DN - black) / (white - black)")
+        object.__setattr__(self, "mosaic", np.asarray(self.mosaic, np.float32))
         if self.cfa not in CFA_PATTERNS:
             raise FsidError(f"cfa: {self.cfa!r} is not a Bayer pattern; use one of {', '.join(CFA_PATTERNS)}")
         for name in ("black_level", "white_level", "iso"):
@@ -113,6 +115,28 @@ class Raw:
 def check_raw(raw: object) -> None:
     """FsidError for a path or an array, of which nobody knows how to read it."""
     check_kind(raw, Raw, "read_raw reads one")
+
+
+def check_level(level: Any) -> None:
+    """FsidError for what is no `NoiseLevel`, or a level that is not physical."""
+    check_kind(level, NoiseLevel, "that of a profile is profile.level(iso)")
+    level.check()
+
+
+def noise_to_remove(raw: Raw, level: NoiseLevel | None) -> NoiseLevel:
+    """`level`, by default that of `raw`, which a denoiser is about to remove.
+
+    FsidError where it is unknown or not physical, and where the mosaic holds NaN or infinity.
+    """
+    level = level if level is not None else raw.noise
+    if level is None:
+        raise FsidError(
+            "the noise level of this RAW is unknown: give a profile and an ISO (--profile, --iso)"
+        )
+    check_level(level)
+    if not np.all(np.isfinite(raw.mosaic)):
+        raise FsidError("this RAW holds NaN or infinity; read it again from its file")
+    return level
 
 
 def _gains(white_balance: Any) -> tuple[float, float, float]:
