@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,8 @@ import pytest
 import fsid
 from fsid.dataset import check_png, find_pictures, grid, save_png
 from fsid.errors import FsidError
-from fsid.evaluate import evaluate_models, model_method, photo_testset, psnr, ssim
+from fsid.evaluate import denoise_classical, evaluate_models, model_method, photo_testset, psnr, ssim
+from fsid.sensor import NoiseLevel, Raw
 
 LIGHT = np.full((8, 8, 3), 0.5, np.float32)
 
@@ -23,6 +25,32 @@ def test_a_path_may_be_a_text(tmp_path: Path):
 
 def test_pictures_may_come_in_any_sequence():
     assert np.array_equal(grid(np.stack([LIGHT, LIGHT])), grid(LIGHT for _ in range(2)))
+
+
+@pytest.mark.parametrize("kind", [np.float16, np.float64, ">f4"])
+def test_a_mosaic_of_any_floating_point_is_kept_in_single_precision(kind: str):
+    raw = Raw(np.full((4, 4), 0.25, kind), "RGGB", 64, 1023, (2.0, 1.0, 1.5), np.eye(3))
+    assert raw.mosaic.dtype == np.float32
+    assert raw.mosaic.dtype.isnative
+    assert (raw.mosaic == 0.25).all()
+
+
+def test_the_classical_denoiser_keeps_single_precision():
+    raw = Raw(np.full((16, 16), 0.25), "RGGB", 64, 1023, (2.0, 1.0, 1.5), np.eye(3))
+    level = NoiseLevel((1e-3,) * 4, (1e-5,) * 4)
+    assert denoise_classical(raw, level).mosaic.dtype == np.float32
+
+
+def test_other_processes_can_be_handed_the_function():
+    pytest.importorskip("torch")
+    assert pickle.loads(pickle.dumps(fsid.denoise)) is fsid.denoise
+
+
+def test_a_file_that_cannot_be_denoised_is_named_where_nobody_is_told(tmp_path: Path):
+    pytest.importorskip("torch")
+    (tmp_path / "bad.dng").write_bytes(b"")
+    with pytest.raises(FsidError, match=r"1 of 1 files could not be denoised: .*bad\.dng"):
+        fsid.denoise.denoise_folder([tmp_path / "bad.dng"], tmp_path / "out", fsid.load_model())
 
 
 def test_figures_take_tensors():

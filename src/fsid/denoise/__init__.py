@@ -11,6 +11,8 @@ OpenMP reads this once, when PyTorch is imported.
 import inspect
 import os
 import sys
+from collections.abc import Callable
+from importlib import import_module
 from types import ModuleType
 
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
@@ -52,6 +54,10 @@ class CallablePackage(ModuleType):
     """What `fsid.denoise` is, for those who check types too: they see the call, and Any in its names."""
 
     __call__ = staticmethod(_denoise)
+
+    def __reduce__(self) -> tuple[Callable[[str], ModuleType], tuple[str]]:
+        """So that another process can be handed the function."""
+        return import_module, (self.__name__,)
 
 
 sys.modules[__name__].__class__ = CallablePackage

@@ -213,14 +213,15 @@ def denoise_folder(
     skip_existing: bool = False,
     progress: Callable[[int, int], None] | None = None,
     denoised: Callable[[Path, Noise], None] = lambda source, noise: None,
-    failed: Callable[[FsidError], None] = lambda error: None,
+    failed: Callable[[FsidError], None] | None = None,
 ) -> dict[Path, Noise]:
     """Denoise each of `sources` into a DNG of its name in the folder `target`, which is made.
 
     The noise level that was used for each is returned. skip_existing: leave alone what is in `target`
     already; it is whole, as a DNG appears when all of it is written. denoised: told of each that is done.
-    failed: told of each file that cannot be denoised; FsidError says in the end how many they were, or how
-    many are left where the disk takes no more. What is wrong with all of them `check_options` tells before.
+    failed: told of each file that cannot be denoised. FsidError says in the end how many they were, and of
+    the first why where `failed` is not given, or how many are left where the disk takes no more. What is
+    wrong with all of them `check_options` tells before.
     """
     target, paths = Path(target), paths_of(sources)
     names = [path.stem for path in paths]
@@ -235,6 +236,7 @@ def denoise_folder(
     is_new = not target.exists()
     make_folder(target)
     noises: dict[Path, Noise] = {}
+    first = ""
     try:
         for done, (source, out) in enumerate(zip(paths, targets, strict=True)):
             try:
@@ -253,7 +255,10 @@ def denoise_folder(
                 where = f"{len(paths) - done} of {len(paths)} files are left"
                 raise FsidError(f"{error}; {where}, --skip-existing goes on from there") from None
             except FsidError as error:
-                failed(error)
+                if failed is not None:
+                    failed(error)
+                else:
+                    first = first or f": {error}"
             else:
                 denoised(source, noises[source])
             if progress is not None:
@@ -263,5 +268,5 @@ def denoise_folder(
             with contextlib.suppress(OSError):  # something else came to lie in it
                 target.rmdir()
     if failures := len(paths) - len(noises):
-        raise FsidError(f"{failures} of {len(paths)} files could not be denoised")
+        raise FsidError(f"{failures} of {len(paths)} files could not be denoised{first}")
     return noises
