@@ -5,6 +5,7 @@ import fcntl
 import os
 import signal
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -126,6 +127,14 @@ def test_of_files_that_belong_together_none_is_written_without_the_others(
             write_together({tmp_path / name: b"new" for name in order})
         assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "b", "folder"]
         assert (tmp_path / "a").read_bytes() == b"old"
+
+
+def test_threads_may_write_to_one_place(tmp_path: Path) -> None:
+    with ThreadPoolExecutor(8) as pool:
+        for _ in pool.map(lambda n: write_atomically(tmp_path / "a", bytes([n]) * 1000), range(100)):
+            pass
+    assert len(set((tmp_path / "a").read_bytes())) == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["a"]
 
 
 def test_a_place_that_is_no_folder_is_one_line(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ import errno
 import fcntl
 import os
 import re
+import threading
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import BinaryIO
@@ -93,7 +94,7 @@ def write_together(files: Mapping[Path, bytes]) -> None:
     FsidError names the one that the disk refuses; then all are as they were. So it does for what is no file:
     renaming would put one in the place of /dev/null or of a pipe.
     """
-    parts = {path: path.with_name(f"{path.name}.{os.getpid()}.part") for path in files}
+    parts = {path: path.with_name(f"{path.name}.{threading.get_native_id()}.part") for path in files}
     try:
         for path, data in files.items():
             if path.is_dir():

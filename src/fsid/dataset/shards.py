@@ -12,6 +12,7 @@ import os
 import re
 import socket
 import tarfile
+import threading
 import time
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -38,8 +39,8 @@ def shard_path(folder: str | Path, number: int) -> Path:
 
 
 def part_path(path: Path) -> Path:
-    """Where this process writes a shard before it gets its name."""
-    return path.with_name(f".{path.name}.{socket.gethostname()}-{os.getpid()}.part")
+    """Where this thread writes a shard before it gets its name."""
+    return path.with_name(f".{path.name}.{socket.gethostname()}-{threading.get_native_id()}.part")
 
 
 def remove_parts(folder: Path, unused_s: float) -> None:
