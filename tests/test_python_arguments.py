@@ -10,8 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import fsid
+from fsid.assets import build_mesh
 from fsid.dataset import (
     GenerateConfig,
     contact_sheet,
@@ -23,13 +25,18 @@ from fsid.errors import FsidError
 from fsid.evaluate import (
     NOISY,
     compare,
+    denoise_classical,
     photo_testset,
     simulated_testset,
 )
 from fsid.render import Renderer
 from fsid.scene import SceneConfig, sample
 from fsid.sensor import (
+    NoiseLevel,
+    NoiseTerms,
     Raw,
+    add_noise,
+    add_noise_terms,
     clean_from_frame,
     clean_from_linear,
     clean_from_photo,
@@ -38,6 +45,8 @@ from fsid.sensor import (
     noisy_from_clean,
     raw_from_dn,
 )
+from fsid.sensor.colour import colour_rand
+from fsid.sensor.exposure import expose
 
 LIGHT = np.full((8, 8, 3), 0.5, np.float32)
 PIXEL6 = load_profile("pixel6")
@@ -80,6 +89,38 @@ MISTAKES: dict[str, tuple[Callable[[], object], str]] = {
     "that of a photograph": (
         lambda: clean_from_photo(rng(), LIGHT, "pixel6"),
         "a str is no CameraProfile",
+    ),
+    "a seed for terms": (
+        lambda: add_noise_terms(7, raw(), PIXEL6.level(800), NoiseTerms()),
+        "a int is no Gen",
+    ),
+    "a seed for an exposure": (lambda: expose(7, LIGHT), "a int is no Generator"),
+    "a seed for a colour": (lambda: colour_rand(7, np.eye(3)[None]), "a int is no Generator"),
+    "two numbers for a level": (
+        lambda: add_noise(rng(), raw(), (1e-3, 1e-5)),
+        "a tuple is no NoiseLevel",
+    ),
+    "a Pillow image for a photograph": (
+        lambda: clean_from_photo(rng(), Image.new("RGB", (8, 8)), PIXEL6),
+        "a photo: a Image is no array",
+    ),
+    "a list for a picture": (lambda: save_png("a.png", [[[0.5]]]), "a picture: a list is no array"),
+    "a photograph of nothing": (
+        lambda: clean_from_photo(rng(), LIGHT[:0], PIXEL6),
+        r"must have shape .* got \(0, 8, 3\)",
+    ),
+    "a seed below 0": (lambda: build_mesh("mug", -1), "seed -1: must not be negative"),
+    "a profile for the classical denoiser": (
+        lambda: denoise_classical(raw(), PIXEL6),
+        "a CameraProfile is no NoiseLevel",
+    ),
+    "a level in DN": (
+        lambda: denoise_classical(raw(), NoiseLevel((2.0,) * 4, (3.0,) * 4)),
+        "units of the white level",
+    ),
+    "NaN for a pixel": (
+        lambda: denoise_classical(replace(raw(), mosaic=np.full((8, 8), np.nan)), PIXEL6.level(800)),
+        "holds NaN or infinity",
     ),
     "a seed for a frame": (lambda: clean_from_frame(None, ANY, PIXEL6), "a NoneType is no Generator"),
     "half a width": (lambda: sample(SceneConfig(), 0, width=128 / 2), "width: 64.0 is not a whole number"),

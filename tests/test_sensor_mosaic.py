@@ -48,6 +48,11 @@ def test_packed_order_is_red_green_green_blue_and_gr_shares_the_red_row(cfa):
     assert len({red, gr, gb, blue}) == 4
 
 
+def test_a_crop_of_whole_rows_is_no_window_on_the_original():
+    whole = _raw(np.zeros((4, 4), np.float32), "RGGB")
+    assert not np.shares_memory(bayer_crop(whole, 0, 0, 2, 4).mosaic, whole.mosaic)
+
+
 @given(cfas, st.integers(0, 5), st.integers(0, 5))
 def test_crop_at_any_offset_keeps_every_pixels_colour(cfa, top, left):
     whole = _raw(mosaic(_colours(12, 12), cfa), cfa)

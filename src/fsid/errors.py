@@ -21,7 +21,7 @@ class FsidError(Exception):
 def whole(value: Any, name: str) -> int:
     """A whole number as Python's, also one of NumPy's; FsidError, naming it, for 960.0, a text or None."""
     try:
-        return operator.index(value)
+        return int(operator.index(value))
     except TypeError:
         raise FsidError(f"{name}: {value!r:.60} is not a whole number") from None
 

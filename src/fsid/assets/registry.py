@@ -26,7 +26,7 @@ from fsid.assets.mesh import Mesh
 from fsid.assets.solids import Solid, assemble
 from fsid.assets.sources import load_source
 from fsid.assets.streams import rng_of
-from fsid.errors import FsidError
+from fsid.errors import FsidError, whole
 
 Parts = Mapping[str, Sequence[Solid]]
 MeshFamily = Callable[[np.random.Generator], Parts]
@@ -75,6 +75,8 @@ def _from_family(family: str, seed: int) -> Mesh:
     _discover()
     if family not in _MESHES:
         raise FsidError(f"mesh family '{family}' does not exist; choose one of: {', '.join(mesh_families())}")
+    if whole(seed, "seed") < 0:
+        raise FsidError(f"seed {seed}: must not be negative")
     return assemble(_MESHES[family](rng_of(family, seed)))
 
 

@@ -11,6 +11,7 @@ from PIL import Image
 from fsid.dataset.shards import read_member
 from fsid.errors import FsidError
 from fsid.files import check_output, write_atomically
+from fsid.sensor.arrays import check_array
 
 
 def to_uint8(srgb: np.ndarray) -> np.ndarray:
@@ -18,6 +19,7 @@ def to_uint8(srgb: np.ndarray) -> np.ndarray:
 
     FsidError for other integers, whose range nothing tells, and for NaN.
     """
+    check_array(srgb, "a picture")
     if srgb.dtype == np.uint8:
         return srgb
     if srgb.dtype.kind != "f":
@@ -35,6 +37,7 @@ def save_png(path: str | Path, srgb: np.ndarray) -> None:
     FsidError where it cannot be written, is of another shape, or is none that `to_uint8` takes.
     """
     check_png(path)
+    check_array(srgb, "a picture")
     if srgb.ndim != 3 or srgb.shape[2] != 3 or not srgb.size:
         raise FsidError(f"{path}: a picture must have shape (height, width, 3); got {srgb.shape}")
     buffer = io.BytesIO()

@@ -26,7 +26,7 @@ import numpy as np
 from fsid.config import from_plain, to_plain
 from fsid.dataset import check_pictures, find_photos, read_photo
 from fsid.dataset.pictures import pictures_digest
-from fsid.errors import FsidError
+from fsid.errors import FsidError, whole
 from fsid.files import held, paths_of, write_atomically
 from fsid.sensor import (
     CameraProfile,
@@ -85,6 +85,7 @@ class TestSet:
     profiles_digest: str = ""
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "seed", whole(self.seed, "seed"))
         if self.seed < 0:
             raise FsidError(f"seed {self.seed}: must not be negative")
         if not 1 <= self.frames <= _MOST_FRAMES:

@@ -13,11 +13,23 @@ from typing import Any
 
 import numpy as np
 
-from fsid.errors import FsidError
+from fsid.errors import FsidError, check_kind
+
+
+def check_generator(rng: object) -> None:
+    """FsidError for a seed in place of a generator."""
+    check_kind(rng, np.random.Generator, "numpy.random.default_rng(seed) makes one")
+
+
+def check_array(x: Any, what: str) -> None:
+    """FsidError, naming `what`, for a list, a picture of another library or a path."""
+    if not (hasattr(x, "ndim") and hasattr(x, "dtype")):
+        raise FsidError(f"{what}: a {type(x).__name__} is no array; numpy.asarray makes one of numbers")
 
 
 def check_floating(x: Any, what: str) -> None:
     """FsidError, naming `what`, for an array or tensor of whole numbers: nothing tells what is white."""
+    check_array(x, what)
     if x.dtype.kind != "f" if isinstance(x, np.ndarray) else not x.is_floating_point():
         raise FsidError(
             f"{what} must be floating-point, with 1 for white; got {x.dtype}: divide by the white"

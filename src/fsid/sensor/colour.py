@@ -16,7 +16,7 @@ import numpy as np
 import yaml
 
 from fsid.errors import FsidError
-from fsid.sensor.arrays import check_floating, like
+from fsid.sensor.arrays import check_floating, check_generator, like
 
 # IEC 61966-2-1, linear sRGB -> XYZ, D65, the rounding that Brooks et al. use.
 SRGB_TO_XYZ = np.array(
@@ -74,6 +74,7 @@ def colour_rand(
     `RED_GAIN_RANGE` and `BLUE_GAIN_RANGE` (Brooks et al. 2019). Brightness is not drawn here; see `exposure`.
     FsidError for matrices of another shape, such as a single one: give [matrix].
     """
+    check_generator(rng)
     if np.shape(xyz_to_camera)[1:] != (3, 3):
         raise FsidError(f"xyz_to_camera has shape {np.shape(xyz_to_camera)}; expected (m, 3, 3)")
     weights = rng.uniform(size=len(xyz_to_camera))

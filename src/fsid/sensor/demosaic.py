@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fsid.sensor.arrays import check_array
 from fsid.sensor.mosaic import site_offsets
 from fsid.sensor.raw import check_even
 
@@ -20,6 +21,7 @@ _STRIP = 64  # rows at once, an even number: what is in between stays in the cac
 
 def demosaic(mosaic: np.ndarray, cfa: str) -> np.ndarray:
     """Mosaic (H, W) to camera RGB (H, W, 3) float32; FsidError unless both are even. Samples are kept."""
+    check_array(mosaic, "a mosaic")
     check_even(mosaic.shape)
     padded = np.pad(mosaic.astype(np.float32, copy=False), _PAD, mode="reflect")
     out = np.empty((*mosaic.shape, 3), np.float32)

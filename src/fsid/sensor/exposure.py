@@ -19,6 +19,7 @@ from __future__ import annotations
 import numpy as np
 
 from fsid.errors import FsidError
+from fsid.sensor.arrays import check_generator
 from fsid.sensor.colour import SRGB_TO_XYZ
 from fsid.sensor.unprocess import check_light
 
@@ -39,6 +40,7 @@ def exposure_rand(rng: np.random.Generator, radiance: np.ndarray) -> np.ndarray:
 
     FsidError for another shape, for integers (a photograph is not linear) and for NaN or infinity.
     """
+    check_generator(rng)
     check_light(radiance)
     if not np.all(np.isfinite(radiance)):
         raise FsidError("the frame holds NaN or infinite radiance; check its lights and materials")
@@ -60,7 +62,8 @@ def expose(rng: np.random.Generator, radiance: np.ndarray) -> np.ndarray:
 
     The sensor's channels saturate one by one, so `unprocess.linear_to_camera` does the clipping.
     """
-    return radiance.astype(np.float32, copy=False) * exposure_rand(rng, radiance)
+    gains = exposure_rand(rng, radiance)
+    return radiance.astype(np.float32, copy=False) * gains
 
 
 def _to_world(light: np.ndarray) -> np.ndarray:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from fsid.errors import FsidError
-from fsid.sensor.arrays import namespace
+from fsid.sensor.arrays import check_array, namespace
 from fsid.sensor.raw import CFA_PATTERNS, Raw, check_even
 
 SITES = ("R", "Gr", "Gb", "B")
@@ -50,6 +50,7 @@ def mosaic(rgb: Any, cfa: str) -> Any:
 
     FsidError for another shape or pattern.
     """
+    check_array(rgb, "a picture")
     check_even(rgb.shape[:2])
     if rgb.shape[2:] != (3,):
         raise FsidError(f"a picture must have shape (height, width, 3), RGB; got {tuple(rgb.shape)}")
@@ -64,12 +65,14 @@ def pack(mosaic: Any, cfa: str) -> Any:
 
     FsidError for another shape or pattern.
     """
+    check_array(mosaic, "a mosaic")
     check_even(mosaic.shape)
     return namespace(mosaic).stack([mosaic[r::2, c::2] for r, c in site_offsets(cfa)])
 
 
 def unpack(packed: Any, cfa: str) -> Any:
     """Inverse of `pack`: (4, H/2, W/2) to (H, W). FsidError for another shape or pattern."""
+    check_array(packed, "packed RAW")
     if packed.ndim != 3 or packed.shape[0] != 4:
         raise FsidError(f"packed RAW has shape {packed.shape}; expected (4, height/2, width/2)")
     out = namespace(packed).empty_like(packed.reshape(2 * packed.shape[1], 2 * packed.shape[2]))
@@ -105,7 +108,7 @@ def bayer_crop(raw: Raw, top: int, left: int, height: int, width: int) -> Raw:
     check_even((height, width))
     if top < 0 or left < 0 or top + height > rows or left + width > columns:
         raise FsidError(f"crop {width}x{height} at ({left}, {top}) lies outside the {columns}x{rows} image")
-    cut = np.ascontiguousarray(raw.mosaic[top : top + height, left : left + width])
+    cut = raw.mosaic[top : top + height, left : left + width].copy()
     return replace(
         raw, mosaic=cut, cfa=shift_cfa(raw.cfa, top, left), metadata=raw.metadata.without_geometry()
     )

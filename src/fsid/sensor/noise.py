@@ -17,13 +17,13 @@ from dataclasses import replace
 import numpy as np
 
 from fsid.errors import FsidError
-from fsid.sensor.arrays import check_floating
+from fsid.sensor.arrays import check_floating, check_generator
 from fsid.sensor.formula import noise_variance, with_noise
 from fsid.sensor.gaussian import standard_normal
 from fsid.sensor.mosaic import site_offsets
 from fsid.sensor.profiles import CameraProfile
 from fsid.sensor.quantise import ROUNDING_DN2
-from fsid.sensor.raw import NoiseLevel, Raw, check_even, four
+from fsid.sensor.raw import NoiseLevel, Raw, check_even, check_level, four
 
 K_JITTER = 0.05  # relative sigma: conversion gain from unit to unit, and vendors' rounding of ISO
 _BLOCK_PIXELS = 1 << 17
@@ -54,7 +54,8 @@ def add_noise(rng: np.random.Generator, raw: Raw, level: NoiseLevel) -> Raw:
     Values may fall below 0 and above 1; `quantise` stores them as the camera would. FsidError for a level
     that is none.
     """
-    level.check()
+    check_generator(rng)
+    check_level(level)
     height, width = raw.mosaic.shape
     rows = _rows(level, raw.cfa, width)
     noisy = np.empty((height // 2, 2, width), np.float32)

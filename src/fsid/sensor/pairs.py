@@ -15,13 +15,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fsid.errors import FsidError, check_kind
+from fsid.sensor.arrays import check_generator
 from fsid.sensor.colour import colour_rand
 from fsid.sensor.exposure import expose
 from fsid.sensor.mosaic import mosaic
 from fsid.sensor.noise import add_noise, before_converter
 from fsid.sensor.profiles import CameraProfile
 from fsid.sensor.quantise import clean_levels, quantise
-from fsid.sensor.raw import NoiseLevel, Raw
+from fsid.sensor.raw import NoiseLevel, Raw, check_level
 from fsid.sensor.terms import PAPER, NoiseTerms, add_noise_terms
 from fsid.sensor.unprocess import check_linear, check_srgb, linear_to_camera, unprocess
 
@@ -31,7 +32,6 @@ if TYPE_CHECKING:  # RAW files are read and developed on machines without a grap
 PHOTO_EXPOSURE_MEAN = 0.8  # Brooks et al. 2019: brightness gain is 1 / N(0.8, 0.1)
 PHOTO_EXPOSURE_SIGMA = 0.1
 PHOTO_EXPOSURE_RANGE = (0.5, 1.1)
-_GENERATOR = "numpy.random.default_rng(seed) makes one"
 _STRIP = 32  # rows at once, an even number: what is in between stays in the cache
 
 
@@ -98,8 +98,8 @@ def noisy_from_clean(
     `clean_levels`. Where the terms leave out rounding, the result has these, and a file hardly rounds it.
     terms, unit, exposure_s: what the camera does beyond the paper's model; see `terms`.
     """
-    check_kind(rng, np.random.Generator, _GENERATOR)
-    check_kind(level, NoiseLevel, "that of a profile is profile.level(iso)")
+    check_generator(rng)
+    check_level(level)
     injected = before_converter(level, clean.white_level - clean.black_level) if terms.quantisation else level
     if terms == PAPER:
         noisy = add_noise(rng, clean, injected)
@@ -110,7 +110,7 @@ def noisy_from_clean(
 
 def _check_given(rng: object, profile: object) -> None:
     """FsidError for a seed in place of a generator, and for the name of a profile."""
-    check_kind(rng, np.random.Generator, _GENERATOR)
+    check_generator(rng)
     check_kind(profile, CameraProfile, "load_profile reads one by its name")
 
 

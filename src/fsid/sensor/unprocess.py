@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from fsid.errors import FsidError
-from fsid.sensor.arrays import like, namespace
+from fsid.sensor.arrays import check_array, like, namespace
 from fsid.sensor.colour import apply_matrix, camera_to_srgb_matrix, srgb_to_camera_matrix
 from fsid.sensor.tone import photo_to_linear, srgb_encode, tone_curve
 
@@ -81,8 +81,11 @@ def linear_to_camera(
 
 def check_srgb(srgb: Any) -> None:
     """FsidError unless `srgb` is (H, W, 3) with finite values in 0..1."""
-    if srgb.ndim != 3 or srgb.shape[2] != 3:
-        raise FsidError(f"a photo must have shape (height, width, 3); got {srgb.shape}: convert it to RGB")
+    check_array(srgb, "a photo")
+    if srgb.ndim != 3 or srgb.shape[2] != 3 or 0 in srgb.shape:
+        raise FsidError(
+            f"a photo must have shape (height, width, 3); got {tuple(srgb.shape)}: convert it to RGB"
+        )
     if not (srgb.min() >= 0 and srgb.max() <= 1):
         raise FsidError("a photo must hold finite values in 0..1; divide 8-bit values by 255")
 
@@ -96,8 +99,9 @@ def check_linear(linear: Any) -> None:
 
 def check_light(linear: Any) -> None:
     """FsidError unless `linear` is (H, W, 3) with floating-point values."""
-    if linear.ndim != 3 or linear.shape[2] != 3:
-        raise FsidError(f"linear light must have shape (height, width, 3), RGB; got {linear.shape}")
+    check_array(linear, "linear light")
+    if linear.ndim != 3 or linear.shape[2] != 3 or 0 in linear.shape:
+        raise FsidError(f"linear light must have shape (height, width, 3), RGB; got {tuple(linear.shape)}")
     if isinstance(linear, np.ndarray) and linear.dtype.kind != "f":
         raise FsidError(
             f"linear light must be floating-point, 1 = saturation; got {linear.dtype}. Photographs are not "
