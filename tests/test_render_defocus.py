@@ -29,14 +29,15 @@ def aperture_of(diameter_px: float, depth_m: float) -> float:
 
 
 @pytest.mark.parametrize("depth_m", [1.2, 5.0, np.inf])
-@pytest.mark.parametrize("diameter_px", [1.0, 3.0, 8.0, 20.0])
+@pytest.mark.parametrize("diameter_px", [1.0, 3.0, 8.0, 20.0, 120.0, 300.0])
 def test_a_point_becomes_as_wide_as_its_disc(depth_m: float, diameter_px: float) -> None:
     """The variance of a disc of diameter D is D^2 / 16 along each axis, and no light is lost."""
-    image = np.zeros((161, 161, 3), np.float32)
-    image[80, 80] = 1.0
-    depth = np.full((161, 161), depth_m, np.float32)
+    middle = 80 + 2 * int(diameter_px)
+    image = np.zeros((2 * middle + 1, 2 * middle + 1, 3), np.float32)
+    image[middle, middle] = 1.0
+    depth = np.full(image.shape[:2], depth_m, np.float32)
     seen = defocus(image, depth, aperture_of(diameter_px, depth_m), FOCUS_M, FOCAL_PX)[..., 1].astype(float)
-    at = np.arange(161)
+    at = np.arange(len(image))
     mean = (seen.sum(0) * at).sum() / seen.sum()
     assert seen.sum() == pytest.approx(1.0, abs=0.01)
     assert (seen.sum(0) * (at - mean) ** 2).sum() == pytest.approx(diameter_px**2 / 16, rel=0.06)

@@ -20,6 +20,8 @@ from fsid.render.blur import blurred, gaussian_weights
 
 _SIGMA_PX = np.array([0.0, 0.3, 0.5, 0.85, 1.4, 2.4, 4.0, 6.8, 11.5, 20.0])
 """Standard deviations of the layers; what lies between two is shared so that its variance is right."""
+_WIDER = 1.7
+"""Where a frame is blurred by more, further layers are so many times wider than the one before."""
 _SEEN = 0.1
 """Share of the neighbourhood from which on what is behind counts as known."""
 _SHORT_PX = 0.8
@@ -45,13 +47,14 @@ def defocus(
     """
     depth = minimum_filter(depth, 3)  # pixels that an edge divides belong to its near side
     blur = (1 / depth - np.float32(1 / focus_m)) * np.asarray(aperture_m * focal_px / 4, np.float32)
-    place = np.interp(blur**2, _SIGMA_PX**2, np.arange(len(_SIGMA_PX))).astype(np.float32)
+    sigmas_px = _layers_px(float(np.abs(blur).max()))
+    place = np.interp(blur**2, sigmas_px**2, np.arange(len(sigmas_px))).astype(np.float32)
     np.copysign(place, blur, out=place)  # above 0 before the sharp plane
     del blur
     colours = [np.ascontiguousarray(radiance[..., i]) for i in range(3)]
     seen = np.zeros((4, *depth.shape), np.float32)  # what lies behind the next layer: light * known, known
     for layer in range(int(np.floor(place.min())), int(np.ceil(place.max())) + 1):
-        sigma_px = float(_SIGMA_PX[abs(layer)])
+        sigma_px = float(sigmas_px[abs(layer)])
         window = _window(np.abs(place - layer) < 1, int(np.ceil(3 * sigma_px)) + 4)
         if window is None:
             continue
@@ -67,6 +70,12 @@ def defocus(
             _lay_over(plane, _blurred(colour[window] * share, sigma_px), left, front)
     seen[:3] /= np.maximum(seen[3], _NONE)
     return np.ascontiguousarray(seen[:3].transpose(1, 2, 0))
+
+
+def _layers_px(widest_px: float) -> np.ndarray:
+    """Standard deviations of the layers of a frame whose widest blur has this one."""
+    more = int(np.ceil(np.log(max(widest_px / _SIGMA_PX[-1], 1)) / np.log(_WIDER)))
+    return np.concatenate([_SIGMA_PX, _SIGMA_PX[-1] * _WIDER ** np.arange(1, more + 1)])
 
 
 def _shares(place: np.ndarray, layer: int) -> tuple[np.ndarray, np.ndarray]:
