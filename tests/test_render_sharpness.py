@@ -15,7 +15,7 @@ from fsid.scene.model import Camera
 CAMERA = Camera((0, 1, 1), (0, 0, 0), (0, 1, 0), 60.0, 64, 64)
 
 
-@pytest.mark.parametrize("softness_px", [0.7, 1.5, 4.0])
+@pytest.mark.parametrize("softness_px", [0.1, 0.28, 0.4, 0.5, 0.55, 0.6, 0.65, 0.8, 1.5, 4.0])
 def test_a_point_spreads_as_stated(softness_px):
     point = np.zeros((65, 65, 3), np.float32)
     point[32, 32] = (1.0, 2.0, 3.0)
@@ -25,10 +25,10 @@ def test_a_point_spreads_as_stated(softness_px):
     away = np.arange(65) - 32
     for axis in (0, 1):
         variance = (spread[..., 1].sum(axis=axis) / 2 * away**2).sum()
-        assert np.sqrt(variance) == pytest.approx(softness_px, rel=0.04)
+        assert np.sqrt(variance) == pytest.approx(softness_px, rel=0.02)
 
 
-@pytest.mark.parametrize("sigma_px", [0.1, 0.3, 1.0, 20.0])
+@pytest.mark.parametrize("sigma_px", [0.6, 1.0, 20.0])
 @pytest.mark.parametrize("size", [(1, 1), (1, 50), (50, 1), (33, 5, 3), (70, 40, 3), (700, 100)])
 def test_a_blur_is_that_of_scipy_whatever_the_size_of_the_picture(size, sigma_px):
     image = np.random.default_rng(2).random(size, np.float32)
@@ -77,7 +77,7 @@ def test_a_camera_softens_and_sharpens_its_own_pictures():
     same = image.copy()
     set_sharpness(same, CAMERA)
     np.testing.assert_array_equal(same, image)
-    for softness_px, sharpening in ((0.8, 0.5), (0.0, 0.5), (0.8, 0.0), (20.0, 0.5)):
+    for softness_px, sharpening in ((0.8, 0.5), (0.1, 0.5), (0.0, 0.5), (0.8, 0.0), (20.0, 0.5)):
         both = image.copy()
         set_sharpness(both, replace(CAMERA, softness_px=softness_px, sharpening=sharpening))
         np.testing.assert_array_equal(both, sharpen(soften(image, softness_px), sharpening))

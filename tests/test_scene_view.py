@@ -184,7 +184,7 @@ def test_the_lens_changes_nothing_but_the_lens():
     assert seen.aperture_m > 0
     assert -1 < sum(seen.vignetting) < 0
     assert any(seen.chromatic_aberration)
-    assert 0.4 <= seen.softness_px <= 0.65
+    assert 0.28 <= seen.softness_px <= 0.65
     assert 0.4 <= seen.sharpening <= 1.3
     red, blue = seen.colour_contrast
     assert 0.05 <= red <= 0.17

@@ -25,6 +25,7 @@ _WIDER = 1.7
 _SEEN = 0.1
 """Share of the neighbourhood from which on what is behind counts as known."""
 _SHORT_PX = 0.8
+"""Near layers of a smaller standard deviation hide too little to continue what lies behind them."""
 _COARSE_PX = 1.6
 """From this standard deviation on half the resolution holds all that is left."""
 _COARSE_VARIANCE = 1.0
@@ -152,8 +153,6 @@ def _blurred(image: np.ndarray, sigma_px: float) -> np.ndarray:
     if sigma_px >= _COARSE_PX and min(image.shape) >= 64:
         left = np.sqrt(sigma_px**2 - _COARSE_VARIANCE)
         return _finer(_blurred(_halved(image), float(left) / 2), image.shape)
-    if sigma_px < _SHORT_PX:  # a sampled Gaussian would be too narrow
-        return blurred(image, np.array([1 - sigma_px**2, sigma_px**2 / 2]))
     return blurred(image, gaussian_weights(sigma_px))
 
 

@@ -99,7 +99,7 @@ class LensConfig:
     """Magnification of red and of blue relative to green, minus 1."""
     soft_share: float = knob(1.0, 0.0, 1.0)
     """Share whose lens has a point spread; the rest is as sharp as its pixels."""
-    softness_px: Range = knob((0.4, 0.65), 0.0, 20.0)
+    softness_px: Range = knob((0.28, 0.65), 0.0, 20.0)
     """Standard deviation of the lens's point spread, pixels of the image."""
     sharp_share: float = knob(0.9, 0.0, 1.0)
     """Share of pictures that are sharpened, as published photographs are."""
