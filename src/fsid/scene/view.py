@@ -2,10 +2,12 @@
 
     eye e      moved by (e - (E - 1) / 2) baselines to the right, less where a wall or hill is in the way
     frame f    at time f * interval: hand tremor is a sum of sines per axis, zero at time 0
+    blur       straight: velocity and spin lead from the pose as the shutter opens to that as it closes
 
-A sine has a derivative, so each frame knows the velocity that blurs it; amplitudes fall as 1 / frequency over
-the 1 to 12 Hz of a hand (physiological tremor: Elble and Randall 1976). Frame 0 of the middle view is the
-view as drawn, so a burst shows the scene that a single picture of the same seed shows.
+A path of sines bends back within a long exposure: going on with the velocity of one moment would blur by more
+than the hand moves. Amplitudes fall as 1 / frequency over the 1 to 12 Hz of a hand (physiological tremor:
+Elble and Randall 1976). Frame 0 of the middle view is the view as drawn, so a burst shows the scene that a
+single picture of the same seed shows.
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from fsid.assets import ground_height_m
 from fsid.assets.solids import rotation_matrix
@@ -35,6 +38,8 @@ EYE_SLACK_M = 0.15
 _LEAST_BASELINE_M = 1e-3
 _TREMOR_HZ = (1.0, 12.0)
 _SINES = 6
+_MOMENT_S = 1e-4
+"""In which the velocity of a moment is measured: a shutter that is open for no time has the derivative."""
 
 
 def camera_rand(
@@ -129,22 +134,26 @@ def burst_rand(rng: np.random.Generator, config: MotionConfig, eyes: list[Camera
     if config.frames == 1 and exposure_s == 0:
         return tuple(eyes)
     centre = np.mean([eye.position_m for eye in eyes], axis=0)
+    open_s = max(exposure_s, _MOMENT_S)
+
+    def tremor(time_s: float) -> np.ndarray:
+        """How far the rig is shifted, metres, and turned, degrees: (6,)."""
+        return np.asarray((amplitude * (np.sin(2 * np.pi * wave_hz * time_s + phase) - np.sin(phase))).sum(0))
+
     out = []
     for eye in eyes:
         for frame in range(config.frames):
-            turn = 2 * np.pi * wave_hz * frame * config.interval_s + phase
-            at = (amplitude * (np.sin(turn) - np.sin(phase))).sum(0)
-            speed = (amplitude * 2 * np.pi * wave_hz * np.cos(turn)).sum(0)
-            moved = _moved(eye, centre, at[:3], at[3:])
-            swing = np.cross(np.radians(speed[3:]), np.subtract(eye.position_m, centre))
+            time_s = frame * config.interval_s
+            opens, closes = tremor(time_s - open_s / 2), tremor(time_s + open_s / 2)
+            before, after = (_moved(eye, centre, at).position_m for at in (opens, closes))
             out.append(
                 replace(
-                    moved,
+                    _moved(eye, centre, tremor(time_s)),
                     frame=frame,
-                    time_s=frame * config.interval_s,
+                    time_s=time_s,
                     exposure_s=exposure_s,
-                    velocity_m_s=vec3(speed[:3] + swing),
-                    spin_deg_s=vec3(speed[3:]),
+                    velocity_m_s=vec3(np.subtract(after, before) / open_s),
+                    spin_deg_s=vec3(_turn_deg(opens, closes) / open_s),
                 )
             )
     return tuple(out)
@@ -172,11 +181,17 @@ def _shake_rand(rng: np.random.Generator, limits: Range) -> float:
     return float(low * (high / low) ** at) if low > 0 else float(low + at * (high - low))
 
 
-def _moved(camera: Camera, centre_m: np.ndarray, shift_m: np.ndarray, turn_deg: np.ndarray) -> Camera:
-    """The camera shifted, and turned by small angles about the world axes through the middle of its rig."""
-    turn = rotation_matrix(*turn_deg)
-    position = centre_m + shift_m + turn @ np.subtract(camera.position_m, centre_m)
+def _moved(camera: Camera, centre_m: np.ndarray, tremor: np.ndarray) -> Camera:
+    """The camera shifted, and turned about the world axes through the middle of its rig."""
+    turn = rotation_matrix(*tremor[3:])
+    position = centre_m + tremor[:3] + turn @ np.subtract(camera.position_m, centre_m)
     target = position + turn @ np.subtract(camera.target_m, camera.position_m)
     return replace(
         camera, position_m=vec3(position), target_m=vec3(target), up=vec3(turn @ np.array(camera.up))
     )
+
+
+def _turn_deg(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """(3,) degrees about a world axis: the one rotation from the tremor (6,) before to that after."""
+    turn = rotation_matrix(*after[3:]) @ rotation_matrix(*before[3:]).T
+    return np.degrees(Rotation.from_matrix(turn).as_rotvec())
