@@ -102,7 +102,7 @@ def lamp_places(s):
 FULL = dataclasses.replace(
     EVERYWHERE,
     rig=RigConfig(eyes=2),
-    motion=MotionConfig(frames=2, exposure_s=(0.01, 0.05), moving_share=0.5),
+    motion=MotionConfig(frames=2, exposure_s=(0.01, 0.03), moving_share=0.5),
     lens=LensConfig(distortion_share=0.5, blur_share=0.5, vignetting_share=0.5, fringe_share=0.5),
     materials=MaterialConfig(lobe_share=0.7, coat_share=0.2, emission_share=0.5),
 )

@@ -170,6 +170,13 @@ def test_blur_of_a_shaken_camera_is_what_it_moves_by_from_when_the_shutter_opens
         np.testing.assert_allclose(turned_deg(first, last), turned_deg(opens, closes), atol=1e-6)
 
 
+def test_frames_of_a_burst_do_not_overlap_in_time():
+    MotionConfig(frames=2, interval_s=0.05, exposure_s=(0.01, 0.05))
+    MotionConfig(exposure_s=(0.1, 0.2))
+    with pytest.raises(FsidError, match=r"exposure_s = \(0.01, 0.06\): .* every interval_s = 0.05 s"):
+        MotionConfig(frames=2, interval_s=0.05, exposure_s=(0.01, 0.06))
+
+
 def test_a_still_camera_takes_no_time():
     camera = scene().cameras[0]
     assert (camera.exposure_s, camera.velocity_m_s, camera.spin_deg_s) == (0.0, (0, 0, 0), (0, 0, 0))

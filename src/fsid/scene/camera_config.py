@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from fsid.errors import FsidError
 from fsid.scene.knobs import Range, check_knobs, knob
 
 
@@ -57,7 +58,7 @@ class MotionConfig:
     interval_s: float = knob(1 / 30, 1e-4, 10.0)
     """Time between frames."""
     exposure_s: Range = knob((0.0, 0.0), 0.0, 10.0)
-    """Shutter time; above 0 everything that moves is blurred."""
+    """Shutter time; above 0 everything that moves is blurred. In a burst at most `interval_s`."""
     shake_deg: Range = knob((0.05, 0.4), 0.0, 20.0)
     """Hand tremor: standard deviation of the camera's angle about each axis; log-uniform if above 0."""
     shake_m: Range = knob((0.0005, 0.003), 0.0, 1.0)
@@ -71,6 +72,11 @@ class MotionConfig:
 
     def __post_init__(self) -> None:
         check_knobs(self)
+        if self.frames > 1 and self.exposure_s[1] > self.interval_s:
+            raise FsidError(
+                f"exposure_s = {self.exposure_s}: frames of a burst come every interval_s = "
+                f"{self.interval_s:.4g} s, and none is open for longer"
+            )
 
 
 @dataclass(frozen=True)
