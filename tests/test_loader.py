@@ -704,6 +704,19 @@ def test_stored_noise_of_another_size_or_pattern_is_no_pair(width: int, cfa: str
         PatchDataset(data, replace(CONFIG, noise="stored"), seed=0)
 
 
+def test_stored_noise_of_a_blurred_image_is_no_noise(tmp_path: Path) -> None:
+    """Its difference from the clean one is blur as well; fresh noise needs clean images alone."""
+    image = raw(np.full((HEIGHT, WIDTH), 9000))
+    data = write_pairs(tmp_path, [image], [replace(image, noise=NoiseLevel((1e-3,) * 4, (1e-6,) * 4))])
+    with tarfile.open(shard_path(data, 0)) as tar:
+        names = tar.getnames()
+        files = {name.partition(".")[2]: tar.extractfile(name).read() for name in names}
+    write_shard(shard_path(data, 0), [("00000000", {**files, "degraded.dng": files["clean.dng"]})])
+    with pytest.raises(FsidError, match=r"shard-00000\.tar: noisy images of --task deblur"):
+        PatchDataset(data, replace(CONFIG, noise="stored"), seed=0)
+    PatchDataset(data, CONFIG, seed=0)
+
+
 def test_stored_noise_that_does_not_exist_is_named(dataset: Path) -> None:
     with pytest.raises(FsidError, match=r"no \*\.noisy\.dng"):
         PatchDataset(dataset, replace(CONFIG, noise="stored"), seed=0)

@@ -136,6 +136,11 @@ def dataset_digest(data_dir: Path) -> str:
     return hashlib.sha256(index_mosaics(data_dir)[0].levels().tobytes()).hexdigest()
 
 
+def degraded_in(data_dir: Path) -> Path | None:
+    """The first shard with a pair whose noisy image is of another than the clean one; None: there is none."""
+    return next((shard for shard in find_shards(data_dir) if _index_shard(shard, ".degraded.dng")), None)
+
+
 def task_of(data_dir: Path) -> str:
     """What a dataset's pairs are for, as its config.yaml states; "denoise" where that states nothing."""
     file = data_dir / DATASET_FILE

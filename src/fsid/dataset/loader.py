@@ -41,7 +41,7 @@ from torch import Tensor
 from torch.utils.data import Dataset
 
 from fsid.config import check_fields
-from fsid.dataset.index import StoredMosaic, index_mosaics
+from fsid.dataset.index import StoredMosaic, degraded_in, index_mosaics
 from fsid.dataset.noise_levels import LevelTable
 from fsid.dataset.patch_grid import Cell, Grid, check_shrink, shrink_for
 from fsid.errors import FsidError
@@ -293,6 +293,11 @@ def _noisy_of(
     data_dir: Path, mosaics: tuple[StoredMosaic, ...]
 ) -> dict[tuple[Path, str], tuple[StoredMosaic, NoiseLevel]]:
     """By shard and key of a clean mosaic the noisy one and its level; FsidError where they do not fit."""
+    if shard := degraded_in(data_dir):
+        raise FsidError(
+            f"{shard}: noisy images of --task deblur or super-resolution differ from the clean ones by more "
+            "than noise; take fresh noise"
+        )
     noisy = {(mosaic.shard, mosaic.key): mosaic for mosaic in index_mosaics(data_dir, "noisy")}
     found = {}
     for clean in mosaics:
