@@ -426,6 +426,19 @@ def test_crops_may_be_as_many_as_there_are_windows(overrides: tuple[str, ...]):
     assert dataset_config(small(*overrides), 0).generate.crops == 2
 
 
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        (("scale=4", "crop_width=92"), "crop_width: 92 is no multiple of 8 .*; take 88 or 96$"),
+        (("scale=2", "height=94", "crop_height=94"), "crop_height: 94 is no multiple of 4 .*; take 92$"),
+    ],
+)
+def test_a_crop_that_super_resolution_would_make_smaller_is_refused(overrides: tuple[str, ...], message: str):
+    small(*(each for each in overrides if not each.startswith("scale")))
+    with pytest.raises(FsidError, match=message):
+        small("task=super-resolution", *overrides)
+
+
 def test_more_crops_than_windows_are_named_before_anything_is_written(tmp_path: Path):
     with pytest.raises(FsidError, match="crops: 2"):
         generate(tmp_path / "out", small("crops=2"), count=1)

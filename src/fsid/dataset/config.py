@@ -61,7 +61,8 @@ class GenerateConfig:
     iso_range: lowest and highest ISO, drawn log-uniformly.
     crops, exposures, noise_levels: how many of each a frame gives; it gives their product of pairs. All crops
     of a frame share its exposures (camera, colour, brightness), and each pair has noise of its own.
-    crop_width, crop_height: pixels; 0 takes the whole frame.
+    crop_width, crop_height: pixels; 0 takes the whole frame. Of super-resolution multiples of 2 * scale, to
+    which a frame that is none is cut.
     validation_every: one of so many scenes (or photographs) is for validation, with all its pairs; 0: none.
     renderer: raster (OpenGL), or reference (path tracer: slow, and its noise is in the clean image).
     quality: of the rasteriser, high or fast. supersampling: edge of the grid of samples per pixel.
@@ -125,6 +126,7 @@ class GenerateConfig:
             raise FsidError(f"validation_every: {self.validation_every} is negative; 0 means no validation")
         if self.scale not in (2, 4):
             raise FsidError(f"scale: {self.scale} is neither 2 nor 4")
+        self._check_tiles()
         if not 1 <= self.supersampling <= 4:
             raise FsidError(f"supersampling: {self.supersampling} is not between 1 and 4")
         if self.texture_size and (not 64 <= self.texture_size <= 4096 or self.texture_size.bit_count() != 1):
@@ -136,6 +138,19 @@ class GenerateConfig:
             raise FsidError(
                 f"{key}: {size} is not 0 or an even number of pixels from 32 to the frame's {frame}"
             )
+
+    def _check_tiles(self) -> None:
+        """FsidError for a crop that is not whole 2x2 tiles of the small image."""
+        step = 2 * self.scale
+        for key in ("width", "height") if self.task == "super-resolution" else ():
+            size = getattr(self, f"crop_{key}")
+            if size % step:
+                below = size // step * step
+                near = [each for each in (below, below + step) if each <= getattr(self, key)]
+                raise FsidError(
+                    f"crop_{key}: {size} is no multiple of {step} pixels, 2 of the small image with scale "
+                    f"{self.scale}; take {' or '.join(map(str, near))}"
+                )
 
     @property
     def windows(self) -> int:
