@@ -77,6 +77,8 @@ def test_a_blurred_image_has_the_light_of_the_sharp_one_and_less_detail(
     assert sample.record["scene"]["cameras"][0]["exposure_s"] == pytest.approx(0.2)
     assert np.std(sample.noisy.mosaic - blurred.mosaic) < 0.02
     assert {"clean.dng", "noisy.dng", "degraded.dng", "rgb.png", "json"} == encode(sample).keys()
+    for raw in (sample.clean, sample.noisy, blurred):
+        assert raw.metadata.exposure_s == pytest.approx(0.2)
 
 
 def test_the_flow_of_a_burst_leads_each_frame_to_the_first(renderer: Renderer) -> None:

@@ -44,6 +44,7 @@ from fsid.sensor import (
     noisy_from_clean,
 )
 from fsid.sensor.light import LONGEST_EXPOSURE_S
+from fsid.sensor.metadata import exposure_metadata
 
 _SCENE, _CROP, _EXPOSURE, _COLOUR, _NOISE, _TASK, _UNIT = range(7)
 _WINDOWS = 3
@@ -152,7 +153,7 @@ class Attempt:
             scene = self.drawn_scene()
             facts = {"split": split_of(config, self.frame), "scene": to_plain(scene)}
             views, shutter_s = views_of_scene(rng, config, scene, renderer), scene.cameras[0].exposure_s
-            return _Source(views, facts, is_linear=True, exposure_s=shutter_s or LONGEST_EXPOSURE_S)
+            return _Source(views, facts, is_linear=True, shutter_s=shutter_s)
         number, path = self.drawn_picture()
         check_task(config, [path])
         picture = read_picture(path)
@@ -164,7 +165,7 @@ class Attempt:
         rng = self._rng(_EXPOSURE, number)
         profile = load_profile(self.config.cameras[rng.integers(len(self.config.cameras))])
         gains = exposure_rand(rng, source.views.truth) if source.is_linear else None
-        return _Shot(profile, gains, source.exposure_s, self._stream(_COLOUR, number))
+        return _Shot(profile, gains, source.shutter_s, self._stream(_COLOUR, number))
 
     def _window(self, views: Views, number: int) -> Window:
         width, height = self.config.crop_width, self.config.crop_height
@@ -224,14 +225,15 @@ class Attempt:
     def _specimen(self, place: tuple[int, int], shot: _Shot) -> dict[str, Any]:
         """What the terms of the profile depend on beside the level, as far as it has such terms.
 
-        Each crop is a part of the sensor with patterns of its own.
+        Each crop is a part of the sensor with patterns of its own. Where the scene has no shutter time, it is
+        that of auto-exposure in low light, which takes the longest before it raises the ISO.
         """
         terms = shot.profile.terms
         facts: dict[str, Any] = {}
         if terms.fixed or terms.prnu or terms.defective:
             facts["unit"] = int(self._rng(_UNIT, *place).integers(2**31))
         if terms.dark_current_e_s:
-            facts["exposure_s"] = shot.exposure_s
+            facts["exposure_s"] = shot.shutter_s or LONGEST_EXPOSURE_S
         return facts
 
     def _stream(self, *place: int) -> np.random.SeedSequence:
@@ -259,23 +261,25 @@ def _half_precision(flow: np.ndarray) -> np.ndarray:
 class _Source:
     """What a frame is made of, a scene or a picture, and where it is from.
 
-    exposure_s: the scene's own shutter time where it has one, else that of auto-exposure in low light, which
-    takes the longest before it raises the ISO.
+    shutter_s: the scene's own shutter time, 0 where it has none.
     """
 
     views: Views
     facts: dict[str, Any]
     is_linear: bool
-    exposure_s: float = LONGEST_EXPOSURE_S
+    shutter_s: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class _Shot:
-    """One exposure of a frame: camera, brightness and colour. gains: (3,), None for photographs."""
+    """One exposure of a frame: camera, brightness and colour. gains: (3,), None for photographs.
+
+    shutter_s: of the scene, 0 where it has none; files state no other.
+    """
 
     profile: CameraProfile
     gains: np.ndarray | None
-    exposure_s: float
+    shutter_s: float
     colour: np.random.SeedSequence
 
     def clean(self, image: np.ndarray) -> Raw:
@@ -283,7 +287,8 @@ class _Shot:
         rng = np.random.default_rng(self.colour)
         if self.gains is None:
             return clean_from_photo(rng, image, self.profile)
-        return clean_from_linear(rng, image, self.profile, self.gains)
+        raw = clean_from_linear(rng, image, self.profile, self.gains)
+        return replace(raw, metadata=exposure_metadata(self.shutter_s)) if self.shutter_s else raw
 
 
 SAMPLE_KEY = re.compile(r"[0-9]{1,18}")
