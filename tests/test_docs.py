@@ -8,6 +8,7 @@ import re
 import shlex
 import shutil
 import tarfile
+import tomllib
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -236,6 +237,14 @@ def test_the_readme_names_every_command_and_no_other():
     text = (REPOSITORY / "README.md").read_text(encoding="utf-8")
     named = set(re.findall(r"^\| `fsid ([a-z]+)", text, re.M))
     assert named == set(COMMANDS)
+
+
+def test_the_readme_says_what_every_extra_adds():
+    project = tomllib.loads((REPOSITORY / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extras = project["optional-dependencies"]
+    text = (REPOSITORY / "README.md").read_text(encoding="utf-8")
+    assert [name for name in extras if f"| `.[{name}]` |" not in text] == ["all", "test"]
+    assert "fsid[train]" in extras["onnx"]  # whose commands load PyTorch, too
 
 
 def test_the_python_of_the_readme_runs(desk: Path, monkeypatch: pytest.MonkeyPatch):
