@@ -6,15 +6,17 @@ Analog gain multiplies the electrons, so k rises with ISO and the amplified part
 its square; c1 lets the transition curve. Real sensors depart from the law (a dual conversion gain steps
 between two such lines), so the table is believed where it exists and the law carries it beyond its ends:
 
-- between table points: monotone cubic through log(value) over log(ISO) (Fritsch & Carlson 1980);
+- between table points: monotone cubic (Fritsch & Carlson 1980) through log(value) over log(law). Points on
+  the law are joined by the law itself; over log(ISO) they would be by powers of ISO, which a floor is not. A
+  law that stands still says nothing of the points and is replaced by ISO;
 - outside: the law, scaled to join the last point;
 - a published value that falls while ISO rises is a fit's error: it is averaged with its neighbours until none
   falls;
 - where a table states standard errors, as a calibrated one does, neighbours that fall within three errors of
   their difference are pooled, weighted by their errors (Ayer et al. 1955). A fall beyond them is the
   camera's: another conversion gain, with less read noise. It is kept, and so is all that does not fall. Each
-  gain has a cubic of its own, since a common one would level out at both sides of the fall, and a law of its
-  own beyond the end of the table, since a common one finds read noise that does not grow with ISO.
+  gain has a law and a cubic of its own: a common cubic would level out at both sides of the fall, and a
+  common law finds read noise that does not grow with ISO. The fall itself is straight, over log(ISO).
 
 sigma2 below the rounding noise of the converter, 1/12 DN^2, is impossible for an image made of integers; a
 published table holds such values, even negative ones, when its intercepts were fitted without that bound.
@@ -31,12 +33,13 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.polynomial.polynomial import polyval
-from scipy.interpolate import PchipInterpolator, PPoly
+from scipy.interpolate import PchipInterpolator
 from scipy.optimize import nnls
 
 RELATIVE_ERROR = 0.1  # of a published value against the law, where no absolute error dominates
 DIGITS = 1e-5  # relative; a value this near the floor is the floor, written to the six digits of a file
 SIGNIFICANT = 3.0  # standard errors of a difference, beyond which a fall is real
+_ISO = np.array([0.0, 1.0])  # the polynomial
 _REWEIGHTINGS = 10
 
 
@@ -44,30 +47,33 @@ _REWEIGHTINGS = 10
 class IsoCurve:
     """Values of the four sites R, Gr, Gb, B at any ISO.
 
-    first, last: ends of the table. inside: log(ISO) -> log(values) between them, None where the law alone
-    holds. below, above: (powers, 4) polynomial coefficients of the law at both ends, in ascending order.
+    iso: (n,) of the table. laws: (powers, n - 1, 4) between its points. cubics: (4, n - 1, 4) there,
+    log(values) over log(law), from the lower point on; none where the law alone holds. below, above:
+    (powers, 4) the law at both ends. Coefficients of polynomials are in ascending order.
     """
 
-    first: float
-    last: float
-    inside: PPoly | None
+    iso: np.ndarray
+    laws: np.ndarray
+    cubics: np.ndarray
     below: np.ndarray
     above: np.ndarray
 
     def __call__(self, iso: float) -> np.ndarray:
         """(4,) values at `iso` > 0."""
-        law = self.below if iso < self.first else self.above
-        if self.inside is None:
-            return polyval(iso, law)
-        nearest = min(max(iso, self.first), self.last)
-        return np.exp(self.inside(np.log(nearest))) * polyval(iso, law) / polyval(nearest, law)
+        end = self.below if iso < self.iso[0] else self.above
+        intervals = self.cubics.shape[1]
+        if not intervals:
+            return polyval(iso, end)
+        nearest = min(max(iso, self.iso[0]), self.iso[-1])
+        at = min(int(np.searchsorted(self.iso, nearest, side="right")), intervals) - 1
+        law, cubic = self.laws[:, at], self.cubics[:, at]
+        x = np.log(polyval(nearest, law) / polyval(self.iso[at], law))
+        return np.exp(polyval(x, cubic, tensor=False)) * polyval(iso, end) / polyval(nearest, end)
 
 
 def k_curve(iso: np.ndarray, k: np.ndarray, error: np.ndarray | None = None) -> IsoCurve:
     """k over ISO from a table: iso (n,) ascending, k (n, 4) > 0, error (n, 4) standard errors if known."""
-    believed = _believed(k, error)
-    below, above = (np.stack(laws, axis=1) for laws in _laws(k_law, iso, k, believed))
-    return IsoCurve(iso[0], iso[-1], _inside(iso, believed), below, above)
+    return _curve(k_law, iso, k, _believed(k, error))
 
 
 def sigma2_curve(
@@ -86,24 +92,44 @@ def sigma2_curve(
         coefficients[0] += floor
         return coefficients
 
-    believed = _believed(sigma2, None if impossible.size else error)
-    below, above = (np.stack(laws, axis=1) for laws in _laws(law, iso, sigma2, believed))
-    return IsoCurve(iso[0], iso[-1], None if impossible.size else _inside(iso, believed), below, above)
+    if impossible.size:
+        laws = np.stack([law(iso, site) for site in sigma2.T], axis=1)
+        return IsoCurve(iso, np.empty((3, 0, 4)), np.empty((4, 0, 4)), laws, laws)
+    return _curve(law, iso, sigma2, _believed(sigma2, error))
 
 
-def _laws(
+def _curve(
     law: Callable[[np.ndarray, np.ndarray], np.ndarray],
     iso: np.ndarray,
     values: np.ndarray,
     believed: np.ndarray,
-) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """What `law` makes of each site of a table up to its first fall, and from its last one on."""
+) -> IsoCurve:
+    """Through `believed`: from fall to fall of a site over what `law` makes of `values`, a fall straight."""
+    laws, cubics = np.zeros((3, len(iso) - 1, 4)), np.zeros((4, len(iso) - 1, 4))
     below, above = [], []
-    for site, seen in zip(values.T, believed.T, strict=True):
-        starts = (0, *(np.flatnonzero(np.diff(seen) < 0) + 1), len(iso))
-        below.append(law(iso[: starts[1]], site[: starts[1]]))
-        above.append(law(iso[starts[-2] :], site[starts[-2] :]) if len(starts) > 2 else below[-1])
-    return below, above
+    for site in range(4):
+        starts = (0, *(np.flatnonzero(np.diff(believed[:, site]) < 0) + 1), len(iso))
+        pieces = [slice(*ends) for ends in pairwise(starts)]
+        own = [law(iso[piece], values[piece, site]) for piece in pieces]
+        falls = [slice(start - 1, start + 1) for start in starts[1:-1]]
+        for piece, polynomial in zip((*pieces, *falls), (*own, *[_ISO] * len(falls)), strict=True):
+            inside = slice(piece.start, piece.stop - 1)
+            used, cubic = _joined(iso[piece], believed[piece, site], polynomial)
+            laws[: len(used), inside, site] = used[:, None]
+            cubics[:, inside, site] = cubic
+        below.append(own[0])
+        above.append(own[-1])
+    return IsoCurve(iso, laws, cubics, np.stack(below, axis=1), np.stack(above, axis=1))
+
+
+def _joined(iso: np.ndarray, values: np.ndarray, law: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """What to join (n,) `values` over, `law` or ISO itself, and the (4, n - 1) cubics, ascending powers."""
+    if len(iso) == 1:
+        return law, np.empty((4, 0))
+    x = np.log(polyval(iso, law))
+    if np.diff(x).min() <= DIGITS:
+        law, x = _ISO, np.log(iso)
+    return law, PchipInterpolator(x, np.log(values)).c[::-1]
 
 
 def k_law(iso: np.ndarray, k: np.ndarray) -> np.ndarray:
@@ -123,24 +149,6 @@ def _believed(values: np.ndarray, error: np.ndarray | None) -> np.ndarray:
     if error is None:
         return _rising(values)
     return np.stack([_pooled(*site) for site in zip(values.T, error.T, strict=True)], axis=1)
-
-
-def _inside(iso: np.ndarray, believed: np.ndarray) -> PPoly | None:
-    return None if len(iso) == 1 else _cubics(np.log(iso), np.log(believed))
-
-
-def _cubics(x: np.ndarray, y: np.ndarray) -> PPoly:
-    """Through y (n, 4) over x (n,), n > 1: a monotone cubic from fall to fall of a site, a fall straight."""
-    coefficients = np.zeros((4, len(x) - 1, y.shape[1]))
-    for site, values in enumerate(y.T):
-        slopes = np.diff(values) / np.diff(x)
-        falls = np.flatnonzero(slopes < 0)
-        coefficients[2:, falls, site] = slopes[falls], values[falls]
-        for first, last in pairwise((0, *(falls + 1), len(x))):
-            if last - first > 1:
-                cubic = PchipInterpolator(x[first:last], values[first:last])
-                coefficients[:, first : last - 1, site] = cubic.c
-    return PPoly(coefficients, x)
 
 
 def _rising(values: np.ndarray) -> np.ndarray:
