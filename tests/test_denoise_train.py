@@ -824,6 +824,35 @@ def test_a_denoiser_from_pairs_for_something_else_is_said_to_be_one(
     assert capsys.readouterr().err.count("\n") == ("but this trains a denoiser" in said)
 
 
+@pytest.mark.parametrize(
+    ("cameras", "given", "is_said"),
+    [
+        (("mine.yaml",), (), True),
+        (("mine.yaml",), ("profiles=[pixel6,galaxy-s22]",), False),
+        (("galaxy-s22", "pixel6"), (), False),
+        (None, (), False),
+    ],
+)
+def test_noise_of_other_cameras_than_those_of_the_dataset_is_said_to_be(
+    cameras: tuple[str, ...] | None,
+    given: tuple[str, ...],
+    is_said: bool,
+    data: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """A dataset of one's own camera made a denoiser of the noise of two phones, without a word."""
+    folder = Path(shutil.copytree(data, tmp_path / "data"))
+    if cameras:
+        save_settings(DatasetConfig(0, 4, GenerateConfig(cameras=cameras)), folder / "config.yaml")
+    save_settings(replace(CONFIG, steps=1), tmp_path / "train.yaml")
+    command = ["train", str(folder), "-o", str(tmp_path / "run"), "--config", str(tmp_path / "train.yaml")]
+    main([*command, "--quiet", *(("--set", *given) if given else ())])
+    said = " ".join(capsys.readouterr().err.split())
+    line = "was made for mine.yaml; noise is drawn of pixel6, galaxy-s22: --set profiles=[mine.yaml]"
+    assert (line in said, bool(said)) == (is_said, is_said)
+
+
 def test_a_history_is_no_longer_than_a_checkpoint_can_hold() -> None:
     """safetensors takes 100 MB of header, and the training ended there in a traceback, after days."""
     replace(CONFIG, steps=2_000_000, log_every=5, validate_every=1000)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shlex
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -42,6 +43,7 @@ def train(
         resume: Continue the training in the folder with the settings that it has there.
         quiet: No progress line; warnings are printed.
     """
+    from fsid.config import given_keys
     from fsid.dataset.index import task_of
     from fsid.denoise import train as train_network
     from fsid.denoise import train_config
@@ -54,6 +56,8 @@ def train(
     if is_main:
         note_extrapolation(settings.profiles, settings.iso_min, settings.iso_max)
         note_unread((settings.validation_photos,))
+        if not resume and "profiles" not in given_keys(set):
+            _note_cameras(data, settings.profiles)
     task = task_of(data)
     if task != "denoise" and is_main:
         line = f"{data} holds pairs for {task}, but this trains a denoiser: it takes their clean images alone"
@@ -62,3 +66,15 @@ def train(
     model = train_network(data, output, settings, resume=resume, quiet=quiet, command=command)
     if not quiet and is_main:
         Terminal(stderr=True).print(f"model: {model}", soft_wrap=True, markup=False)
+
+
+def _note_cameras(data: Path, profiles: Sequence[str]) -> None:
+    """A line where a dataset was made for other cameras than those whose noise is drawn by default."""
+    from fsid.dataset.index import cameras_of
+    from fsid.denoise import TrainConfig
+
+    cameras = cameras_of(data)
+    is_default = tuple(profiles) == TrainConfig().profiles
+    if cameras and is_default and {*cameras} != {*profiles}:
+        drawn = f"noise is drawn of {', '.join(profiles)}"
+        note(f"{data} was made for {', '.join(cameras)}; {drawn}: --set profiles=[{','.join(cameras)}]")

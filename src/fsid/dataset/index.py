@@ -143,9 +143,19 @@ def degraded_in(data_dir: Path) -> Path | None:
 
 def task_of(data_dir: Path) -> str:
     """What a dataset's pairs are for, as its config.yaml states; "denoise" where that states nothing."""
+    return str(_generate_settings(data_dir).get("task", "denoise"))
+
+
+def cameras_of(data_dir: Path) -> tuple[str, ...]:
+    """The noise profiles of a dataset's noisy images, as config.yaml states; () where that states none."""
+    cameras = _generate_settings(data_dir).get("cameras")
+    return tuple(map(str, cameras)) if isinstance(cameras, list) else ()
+
+
+def _generate_settings(data_dir: Path) -> dict[str, Any]:
     file = data_dir / DATASET_FILE
     settings = read_yaml(file).get("generate") if file.exists() else None
-    return str(settings.get("task", "denoise")) if isinstance(settings, dict) else "denoise"
+    return settings if isinstance(settings, dict) else {}
 
 
 def _origin(data_dir: Path) -> Callable[[StoredMosaic], tuple[int, str]]:
