@@ -31,6 +31,7 @@ from stated_black import state_black
 
 PROFILE = load_profile("galaxy-s22")
 SIDE, FRAMES = 192, 20
+NO_COLOUR = "no colour matrix is stated: xyz_to_camera has the published ones of other cameras"
 
 
 def scene(light: float = 0.9, side: int = SIDE) -> Raw:
@@ -90,6 +91,7 @@ def test_bursts_at_several_isos_give_a_profile_for_any_iso(dng_bursts, tmp_path)
     profile = load_profile(tmp_path / "mine.yaml")
     assert profile.iso == isos
     assert (profile.camera, profile.cfa, profile.black_level) == ("Maker Model", PROFILE.cfa, 64)
+    np.testing.assert_allclose(profile.xyz_to_camera, PROFILE.xyz_to_camera[:1], atol=1e-6)
     measured = profile.measured
     assert measured is not None
     assert (measured.frames, measured.dark_frames) == ((20,) * 3, (5,) * 3)
@@ -101,6 +103,7 @@ def test_bursts_at_several_isos_give_a_profile_for_any_iso(dng_bursts, tmp_path)
         fit = found.fits[row]
         np.testing.assert_allclose(measured.k_error[row] * 959, fit.k_dn_error, rtol=1e-4)
         np.testing.assert_allclose(measured.sigma2_error[row] * 959**2, fit.sigma2_dn_error, rtol=1e-4)
+    assert NO_COLOUR not in found.notes
     for iso in (800, 3200, 12800):
         np.testing.assert_allclose(profile.level(iso).k, PROFILE.level(iso).k, rtol=0.12)
     assert "k_departure" in (tmp_path / "mine.yaml").read_text()
@@ -442,8 +445,8 @@ def test_a_line_that_means_little_is_said(tmp_path, rng):
     paths_dark = write_arrays(tmp_path / "dark", covered)
     lit = [to_dn(raw) for raw in exposures(rng, scene(), 800, 20)]
     bent = [np.interp(dn, [0, 200, 400, 1023], [0, 200, 300, 400]).astype(np.uint16) for dn in lit]
-    assert not notes("lit", lit, dark=6)
-    assert not notes("lit", lit)
+    assert notes("lit", lit, dark=6) == NO_COLOUR
+    assert notes("lit", lit) == NO_COLOUR
     assert "black level is at least 1" in notes("lit", lit, black=44)
     assert "no straight line in light (off by " in notes("bent", bent, dark=6)
     bright = replace(scene(), mosaic=0.3 + 0.3 * scene().mosaic)
@@ -576,7 +579,7 @@ def test_an_iso_that_is_given_replaces_no_other_unsaid(dng_bursts, tmp_path, rng
     images = [to_dn(raw) for raw in exposures(rng, scene(), 800, 6)]
     paths = [*write_arrays(tmp_path / "iso100", images[:3]), *write_arrays(tmp_path / "iso800", images[3:])]
     _fails("--iso 800: .*iso100.*ISO 100, .*iso800.*ISO 800", paths, layout=LAYOUT)
-    assert calibrate(paths[3:], name="x", layout=LAYOUT).notes == ()
+    assert calibrate(paths[3:], name="x", layout=LAYOUT).notes == (NO_COLOUR,)
     _fails("--iso nan", paths, layout=replace(LAYOUT, iso=float("nan")))
     _fails("--iso inf", paths, layout=replace(LAYOUT, iso=float("inf")))
 

@@ -87,6 +87,7 @@ def calibrate(
         cfa=seen.cfa,
         white_level=seen.white_level,
         black_level=seen.black_level,
+        xyz_to_camera=seen.xyz_to_camera,
         camera=camera or seen.name or "unknown",
         frames=Counter(frame.iso for frame in found.frames),
         dark_frames=Counter(frame.iso for frame in found.dark),
@@ -273,6 +274,8 @@ def apart_dn(sigma2_dn: np.ndarray) -> float:
 def _notes(reader: _Reader, isos: Sequence[float], fits: Sequence[NoiseFit]) -> Iterator[str]:
     if unmatched := {frame.iso for frame in reader.found.dark} - set(isos):
         yield f"dark frames of ISO {', '.join(f'{i:g}' for i in sorted(unmatched))} have no bursts: unused"
+    if reader.found.camera.cfa is not None and reader.found.camera.xyz_to_camera is None:
+        yield "no colour matrix is stated: xyz_to_camera has the published ones of other cameras"
     if reader.drifts_dn:
         yield (
             f"the level of {counted(len(reader.drifts_dn), 'burst')} drifted by up to "

@@ -135,13 +135,15 @@ def read_raw(path: str | Path | BinaryIO) -> Raw:
 @dataclass(frozen=True, eq=False)
 class Stored:
     """What a RAW file holds. dn: (H, W) uint16, H and W even. first: (row, column) of its first pixel among
-    all that are stored. cfa: of that pixel. black: of each."""
+    all that are stored. cfa: of that pixel. black: of each. xyz_to_camera: (3, 3) of D65, None where none is
+    stated, or one that cannot be."""
 
     dn: np.ndarray
     first: tuple[int, int]
     cfa: str
     black: BlackLevels
     white_level: int
+    xyz_to_camera: np.ndarray | None
 
     @property
     def black_level(self) -> int:
@@ -297,7 +299,8 @@ def _stored(file: rawpy.RawPy, tags: dict[int, Values], path: Path) -> Stored:
     level, white = black.mean(), int(file.white_level)
     if not (math.isfinite(level) and 0 <= round(level) < white):
         raise FsidError(f"{path}: black level {level:g} is not below white level {white}")
-    return Stored(dn, first, cfa, black, white)
+    matrix = _stated_matrix(file, tags)
+    return Stored(dn, first, cfa, black, white, matrix if is_of_camera(matrix) else None)
 
 
 def _visible(
@@ -360,10 +363,14 @@ def _iso(file: rawpy.RawPy, tags: dict[int, Values]) -> float:
     return dng_tags.iso_speed(tags) or float(file.other.iso_speed)
 
 
-def _xyz_to_camera(file: rawpy.RawPy, tags: dict[int, Values], path: Path) -> np.ndarray:
+def _stated_matrix(file: rawpy.RawPy, tags: dict[int, Values]) -> np.ndarray:
+    """(3, 3) XYZ -> camera of D65, of a DNG's tags or else of LibRaw's table; zeros where neither has one."""
     matrix = dng_tags.d65_matrix(tags)
-    if matrix is None:
-        matrix = np.asarray(file.rgb_xyz_matrix[:3], np.float64)
+    return np.asarray(file.rgb_xyz_matrix[:3], np.float64) if matrix is None else matrix
+
+
+def _xyz_to_camera(file: rawpy.RawPy, tags: dict[int, Values], path: Path) -> np.ndarray:
+    matrix = _stated_matrix(file, tags)
     if not np.any(matrix):
         return published_matrices().mean(axis=0)
     if not is_of_camera(matrix):

@@ -27,6 +27,7 @@ def profile_of(
     cfa: str | None,
     white_level: int,
     black_level: int | None = None,
+    xyz_to_camera: np.ndarray | None = None,
     camera: str = "unknown",
     frames: Mapping[float, int] | None = None,
     dark_frames: Mapping[float, int] | None = None,
@@ -35,9 +36,10 @@ def profile_of(
 ) -> CameraProfile:
     """The profile `name` of the lines that `fit_noise` found, by ISO, for frames that no file holds.
 
-    cfa: None or "MONO" for a monochrome sensor. black_level: DN, None for the mean of `site_blacks`. frames,
-    dark_frames: how many the lines are from, by ISO; 0 where not stated. FsidError: no fit,
-    an ISO that is none, or a white level not above the black level.
+    cfa: None or "MONO" for a monochrome sensor. black_level: DN, None for the mean of `site_blacks`.
+    xyz_to_camera: (3, 3) of D65, None for the published ones of other cameras. frames, dark_frames: how many
+    the lines are from, by ISO; 0 where not stated. FsidError: no fit, an ISO that is none, or a white level
+    not above the black level.
     """
     isos, white_level = sorted(fits), operator.index(white_level)
     if not isos or not all(0 < iso < math.inf for iso in isos):
@@ -61,7 +63,7 @@ def profile_of(
         iso=tuple(isos),
         k=table([fit.k_dn for fit in each]) / span,
         sigma2=table([fit.sigma2_dn for fit in each]) / span**2,
-        xyz_to_camera=published_matrices(),
+        xyz_to_camera=published_matrices() if xyz_to_camera is None else xyz_to_camera[None],
         source=_METHOD,
         notes=notes,
         date=date,

@@ -43,12 +43,12 @@ _ISO_IN_PATH = re.compile(r"iso[-_ ]?(\d+)", re.IGNORECASE)
 _SITES_DIFFER = 0.02  # of the level: a flat grey through colour filters differs by far more
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Camera:
     """What all frames of a calibration share. cfa: None without filters. black_level: None where unknown.
 
     black: of every pixel of the first frame, of bare mosaics what the caller states; None where unknown.
-    shape: (H, W).
+    shape: (H, W). xyz_to_camera: (3, 3) of D65, None where unknown.
     """
 
     name: str
@@ -58,6 +58,7 @@ class Camera:
     bare: bool
     shape: tuple[int, ...]
     black: BlackLevels | None = None
+    xyz_to_camera: np.ndarray | None = None
 
     def site_black(self) -> np.ndarray | None:
         """(4,) black level of sites in what `FrameSet.read` returns, (1,) without a CFA; None if unknown."""
@@ -215,6 +216,7 @@ def _raw_frames(paths: Sequence[Path], dark: Sequence[Path], layout: Layout) -> 
         bare=False,
         shape=first.dn.shape,
         black=first.black,
+        xyz_to_camera=first.xyz_to_camera,
     )
     if replace(layout, iso=None) != Layout():
         raise FsidError(
