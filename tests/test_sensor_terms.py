@@ -69,6 +69,32 @@ def test_banding_is_common_to_rows_and_columns():
     assert noise.mean(axis=1).var() - left == pytest.approx(0.1 * LEVEL.sigma2[0], rel=0.1)
 
 
+@pytest.mark.parametrize("row", [0.0, 0.5])
+@pytest.mark.parametrize("frames", [2, 10])
+def test_the_kurtosis_of_gaussian_noise_scatters_by_its_standard_error(frames, row):
+    found = []
+    for seed in range(40):
+        rng, stats = np.random.default_rng(seed), TemporalStatistics(4095, dark=True)
+        for _ in range(frames):
+            pixels, rows = rng.standard_normal((64, 64)), rng.standard_normal((64, 1))
+            noise = (1 - row) ** 0.5 * pixels + row**0.5 * rows
+            stats.add(np.rint(256 + 2 * noise).astype(np.uint16))
+        found.append(stats.read_statistics())
+    scatter = np.std([each.excess_kurtosis for each in found])
+    assert scatter == pytest.approx(np.mean([each.kurtosis_error for each in found]), rel=0.35)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_gaussian_dark_frames_show_no_term(seed):
+    """In 7 of them the tail of ten frames was beyond 2 %, by chance."""
+    rng, stats = np.random.default_rng(seed), TemporalStatistics(4095, dark=True)
+    for _ in range(10):
+        stats.add(np.rint(256 + 6 * rng.standard_normal((128, 128))).astype(np.uint16))
+    finding = dark_finding(stats, 800, 0.02)
+    assert finding is not None
+    assert finding.terms == NoiseTerms()
+
+
 def test_fixed_pattern_and_prnu_belong_to_the_unit():
     terms, sigma = NoiseTerms(fixed=0.5, prnu=0.02), np.sqrt(LEVEL.sigma2[0])
     dark, bright = stack(terms).mean(axis=0), stack(terms, 0.5).mean(axis=0)

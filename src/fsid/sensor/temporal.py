@@ -45,7 +45,7 @@ class ReadStatistics:
     pixel_dn2, excess_kurtosis: mean over the sites, of all that a pixel shows. sigma_dn: mean over the sites
     of the standard deviation before the converter, DN; row_dn2, column_dn2: what banding would be in a site
     of that sigma, since each has banding in proportion to its own. level_dn2: variance of the frames' levels,
-    as a drifting black level has it.
+    as a drifting black level has it. kurtosis_error: standard error of excess_kurtosis of Gaussian noise.
     """
 
     pixel_dn2: float
@@ -53,6 +53,7 @@ class ReadStatistics:
     row_dn2: float
     column_dn2: float
     excess_kurtosis: float
+    kurtosis_error: float
     level_dn2: float
 
 
@@ -196,14 +197,29 @@ class TemporalStatistics:
         sigma = np.sqrt(np.maximum(second / 2 - ROUNDING_DN2, 0)).reshape(2, 2)
         mean_sigma = float(sigma.mean())
         in_rows, in_columns = (float((sigma.mean(axis) ** 2).mean()) or 1.0 for axis in (1, 0))
+        pixel_dn2 = float(second.mean()) / 2
+        row_share, column_share = self._banding / (self.frames - 1) / 2 / max(pixel_dn2, ROUNDING_DN2)
         return ReadStatistics(
-            pixel_dn2=float(second.mean()) / 2,
+            pixel_dn2=pixel_dn2,
             sigma_dn=mean_sigma,
             row_dn2=max(row / 2, 0.0) * mean_sigma**2 / in_rows,
             column_dn2=max(column / 2, 0.0) * mean_sigma**2 / in_columns,
             excess_kurtosis=2 * (float(kurtosis.mean()) - 3) if kurtosis.size else 0.0,
+            kurtosis_error=self._kurtosis_error(row_share, column_share, int(counted.sum())),
             level_dn2=float(np.var([0.0, *self.offsets_dn], ddof=1)),
         )
+
+    def _kurtosis_error(self, row: float, column: float, pixels: int) -> float:
+        """Of Gaussian noise of which these shares are common to a row and to a column.
+
+        A mean fourth power has the variance 24 / n of n independent normal numbers of variance 1, and two of
+        correlation r share r^4 of it: changes from the same first frame are of correlation 1/2.
+        """
+        height, width = self._powers.shape[1:]
+        changes = self.frames - 1
+        of_time = (1 + (changes - 1) / 16) / changes
+        of_lines = 1 + width * row**4 + height * column**4
+        return 2 * float(np.sqrt(24 / max(pixels, 1) * of_time * of_lines))
 
     def _unusable(self) -> np.ndarray:
         """Pixels that are stuck at 0 or white, or moved.

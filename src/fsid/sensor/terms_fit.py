@@ -33,6 +33,7 @@ from fsid.sensor.terms import NoiseTerms
 FLAT = 0.1  # contrast of an evenly lit burst, relative to its signal; beyond it texture looks like PRNU
 CUT_OFF = 0.002  # of the dark values at DN 0, from which on noise is no longer symmetric
 _STANDING_OUT = 0.02  # share of the noise from which on a term is worth having
+_SIGNIFICANT = 4.0  # standard errors of a tail, which few dark frames leave larger than that
 _LEAST_ALONE = 0.1  # of the noise; with less, the pixels' own part drowns in that of rows and columns
 _CUT = 3.0  # standard deviations, beyond which a step is an edge or a defect
 _LEFT_BY_CUT = 0.9733  # of the variance of a normal number, within the cut
@@ -65,7 +66,7 @@ def dark_finding(stats: TemporalStatistics, iso: float, exposure_s: float) -> Da
     terms = NoiseTerms(
         row=_standing_out(row),
         column=_standing_out(column),
-        tail=_standing_out(found.excess_kurtosis / alone**2),
+        tail=_standing_out(found.excess_kurtosis / alone**2, found.kurtosis_error / alone**2),
         drift=float(np.sqrt(_standing_out(found.level_dn2 / found.sigma_dn**2))),
         fixed=float(np.sqrt(_standing_out(fixed2 / before2))),
         defective=float(far.mean()),
@@ -147,8 +148,8 @@ def _dark_current(dark: Sequence[DarkFinding], k_dn_at_iso: dict[float, float]) 
     return _rounded(max(float(np.mean(slopes)), 0.0)) if slopes else 0.0
 
 
-def _standing_out(share: float) -> float:
-    return share if share > _STANDING_OUT else 0.0
+def _standing_out(share: float, error: float = 0.0) -> float:
+    return share if share > max(_STANDING_OUT, _SIGNIFICANT * error) else 0.0
 
 
 def _rounded(value: float) -> float:
