@@ -24,6 +24,7 @@ from fsid.sensor import (
     write_dng,
 )
 from fsid.sensor.calibrate import NoiseFit
+from fsid.sensor.camera_profile import Optics
 from fsid.sensor.fitted_profile import profile_of, site_blacks
 from fsid.sensor.frames import Frame, bursts, find_frames
 from fsid.sensor.mosaic import site_offsets
@@ -107,6 +108,19 @@ def test_bursts_at_several_isos_give_a_profile_for_any_iso(dng_bursts, tmp_path)
     for iso in (800, 3200, 12800):
         np.testing.assert_allclose(profile.level(iso).k, PROFILE.level(iso).k, rtol=0.12)
     assert "k_departure" in (tmp_path / "mine.yaml").read_text()
+
+
+def test_what_a_replaced_profile_had_and_the_new_one_lacks_is_said(dng_bursts, tmp_path, capsys):
+    """Optics and terms that were written by hand were gone without a word, as was another ISO."""
+    optics, terms = Optics(1.8, 1.2), NoiseTerms(poisson=True)
+    save_profile(tmp_path / "mine.yaml", replace(PROFILE, optics=optics, terms=terms))
+    command = ["calibrate", str(dng_bursts / "light400"), "--dark", str(dng_bursts / "dark400"), "--quiet"]
+    main([*command, "-o", str(tmp_path / "mine.yaml")])
+    said = " ".join(capsys.readouterr().err.split())
+    assert "mine.yaml: was replaced; the one before had what this one lacks: optics, terms.poisson" in said
+    assert "ISO 50, 100," in said
+    main([*command, "-o", str(tmp_path / "mine.yaml")])
+    assert "replaced" not in capsys.readouterr().err
 
 
 def test_arrays_of_several_exposures_and_isos_are_sorted_into_bursts(tmp_path, rng):

@@ -44,7 +44,8 @@ def calibrate(
         frames: RAW files that LibRaw opens, or bare mosaics (.npy, 16-bit .png or .tif, .raw); folders
             stand for the files in them, at any depth. The ISO of bare mosaics is in their path
             (iso3200/a.png), or --iso.
-        output: Profile to write, .yaml.
+        output: Profile to write, .yaml. One that is there is replaced, and a note says what it had and the
+            new one lacks.
         dark: Frames with the lens covered, of the same ISOs: they give black level and sigma2.
         iso: ISO of all frames that state none. One that they do state is replaced, and a note says so; frames
             of several ISOs are refused.
@@ -66,7 +67,7 @@ def calibrate(
     from fsid.sensor import calibrate as calibrate_frames
     from fsid.sensor.fit_plot import calibration_picture, check_profile
     from fsid.sensor.frames import frame_files
-    from fsid.sensor.profiles import profile_file
+    from fsid.sensor.profiles import left_behind, profile_file
 
     check_profile(output, [*frame_files(frames), *frame_files(dark)], plot)
     layout = Layout(iso, cfa, black_levels(black_level), white_level, width, height)
@@ -81,10 +82,13 @@ def calibrate(
             terms=terms,
             progress=progress,
         )
+    lost = left_behind(output, found.profile)
     pictures = {} if plot is None else {plot: calibration_picture(found, plot.suffix)}
     write_together({**pictures, output: profile_file(found.profile)})
     for line in found.notes:
         note(line)
+    if lost:
+        note(f"{output}: was replaced; the one before had what this one lacks: {lost}")
     print_table(_table(found), quiet=quiet)
 
 

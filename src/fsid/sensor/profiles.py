@@ -110,6 +110,22 @@ def far_extrapolated(names: Iterable[str | Path], iso_min: float, iso_max: float
             yield profile
 
 
+def left_behind(path: Path, profile: CameraProfile) -> str:
+    """What the profile at `path` has and `profile`, which is to replace it, lacks: optics, terms, a colour
+    matrix of its own, ISOs; "" where that is nothing, or no profile is there."""
+    try:
+        old = load_profile(path)
+    except FsidError:
+        return ""
+    new, published = _switched_on(profile.terms), published_matrices()
+    found = ["optics"] if old.optics is not None and profile.optics is None else []
+    found += [f"terms.{name}" for name in _switched_on(old.terms) if name not in new]
+    own = not np.array_equal(old.xyz_to_camera, published)
+    found += ["xyz_to_camera"] if own and np.array_equal(profile.xyz_to_camera, published) else []
+    isos = [f"{iso:g}" for iso in old.iso if iso not in profile.iso]
+    return ", ".join([*found, *([f"ISO {', '.join(isos)}"] if isos else [])])
+
+
 def save_profile(path: str | Path, profile: CameraProfile) -> None:
     """Write `profile` as the YAML that `load_profile` reads, whole or not at all.
 
