@@ -13,6 +13,7 @@ from fsid.evaluate.testbench import MATERIALS, simulate
 from fsid.evaluate.testbench.prints import _screen
 from fsid.evaluate.testbench.surface import light_rand, sheet
 from fsid.sensor import light_level, load_profile, pack, read_raw
+from fsid.sensor.dng import read_header
 from fsid.sensor.light import GREY, KEY
 
 
@@ -70,6 +71,18 @@ def test_the_truth_is_exposed_as_the_cameras_meter_would(tmp_path: Path, monkeyp
     made = simulated_testset(tmp_path / "set", camera="pixel6", luxes=[5.0], materials=["text"], **size)
     truth = read_raw(made.clean(tmp_path / "set", made.images[0]))
     np.testing.assert_allclose(pack(truth.mosaic, truth.cfa)[1:3], KEY, rtol=1e-3)
+
+
+def test_a_capture_states_its_iso_and_exposure_time(tmp_path: Path):
+    """Only the noise was stated: nobody could tell what the camera was set to at a level in lux."""
+    size = {"scenes": 1, "width": 64, "height": 64}
+    luxes = [0.02, 500.0]
+    made = simulated_testset(tmp_path / "set", camera="pixel6", luxes=luxes, materials=["text"], **size)
+    for lux, level in zip(luxes, made.levels, strict=True):
+        set_to = light_level(load_profile("pixel6"), lux, highest_iso=np.inf)
+        said = read_header(made.noisy(tmp_path / "set", made.images[0], level))
+        assert said.iso == pytest.approx(set_to.iso)
+        assert said.exposure_s == pytest.approx(set_to.exposure_s, rel=0.01)
 
 
 @pytest.mark.parametrize(

@@ -28,11 +28,23 @@ from fsid.sensor import (
     write_dng,
 )
 from fsid.sensor.colour import published_matrices
-from fsid.sensor.dng import read_stored
+from fsid.sensor.dng import read_header, read_stored
 from fsid.sensor.dng_tags import noise_profile
 from fsid.sensor.frames import find_frames
 from fsid.sensor.metadata import Metadata
-from fsid.sensor.tiff import ASCII, BYTE, CFA, LONG, SHORT, SRATIONAL, Directory, Tag, image_tags, tiff_bytes
+from fsid.sensor.tiff import (
+    ASCII,
+    BYTE,
+    CFA,
+    LONG,
+    SHORT,
+    SRATIONAL,
+    Directory,
+    Tag,
+    image_tags,
+    read_directories,
+    tiff_bytes,
+)
 
 HEIGHT, WIDTH = 34, 50
 PREVIEW = np.random.default_rng(0).integers(0, 256, (17, 25, 3)).astype(np.uint8)
@@ -83,6 +95,22 @@ def test_an_iso_that_its_tag_does_not_hold_is_read_where_it_stands(tmp_path, lar
     raw = read_raw(path)
     assert raw.iso == iso
     assert {tag.code: tag.values for tag in raw.metadata.exif} == {tag.code: tag.values for tag in said}
+
+
+@pytest.mark.parametrize(("iso", "is_large"), [(65535.0, False), (102400.0, True), (321772.4, True)])
+def test_an_iso_that_its_tag_does_not_hold_is_written_where_others_read_it(tmp_path, iso, is_large):
+    """It stood in FSID's private data alone."""
+    path = tmp_path / "a.dng"
+    write_dng(path, replace(_raw("RGGB"), iso=iso))
+    with path.open("rb") as file:
+        exif = {code: tag.values for directory in read_directories(file) for code, tag in directory.items()}
+    assert exif[34855] == (65535,)
+    assert (exif.get(34864), exif.get(34866)) == (((2,), (round(iso),)) if is_large else (None, None))
+    assert read_raw(path).iso == iso
+    path.write_bytes(path.read_bytes().replace(b"FSID\0", b"None\0", 1))
+    assert read_header(path).iso == round(iso)
+    write_dng(path, read_raw(path))  # as a source said it, once
+    assert read_header(path).iso == round(iso)
 
 
 @pytest.mark.parametrize("cfa", CFA_PATTERNS)

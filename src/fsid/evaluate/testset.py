@@ -6,7 +6,8 @@
     DIR/<image>/<level>.noisy.dng         what the camera saw, for example iso3200.noisy.dng
     DIR/<image>/<level>.noisy.01.dng ...  further frames of the same burst
 
-A level is a name such as "iso3200"; the noise level of each capture is in its DNG `NoiseProfile`.
+A level is a name such as "iso3200"; the noise level of each capture is in its DNG `NoiseProfile`, ISO and
+exposure time in its EXIF tags.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import os
 import shutil
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 from typing import NamedTuple, TypeVar
@@ -39,6 +40,7 @@ from fsid.sensor import (
     write_dng,
 )
 from fsid.sensor.light import LONGEST_EXPOSURE_S
+from fsid.sensor.metadata import exposure_metadata
 from fsid.sensor.profiles import profiles_digest
 from fsid.yaml_json import read_json
 
@@ -249,7 +251,8 @@ def capture(
                 noise = profile.level(iso)
                 for frame in range(testset.frames):
                     noisy = noisy_from_clean(rng, clean, iso, noise, profile.terms, exposure_s=exposure_s)
-                    write_dng(testset.noisy(root, image, level, frame), noisy)
+                    said = replace(noisy, metadata=exposure_metadata(exposure_s))
+                    write_dng(testset.noisy(root, image, level, frame), said)
             progress(i + 1, len(testset.images))
         write_testset(root, testset)
 

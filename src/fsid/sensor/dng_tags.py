@@ -59,6 +59,8 @@ _KELVIN |= {12: 6400, 13: 5050, 14: 4150, 15: 3450, 16: 2950, 17: 2850, 18: 5500
 _KELVIN |= {20: 5500, D65: 6500, 22: 7500, 23: 5000, 24: 3200}  # of each LightSource; of a range, its middle
 _UNKNOWN_KELVIN = 5000  # between lamps and daylight
 MAX_EXIF_ISO = 65535
+SENSITIVITY_TYPE, RECOMMENDED_INDEX = 34864, 34866
+_TYPE_RECOMMENDED, _MAX_LONG = 2, 2**32 - 1
 LARGE_ISOS = (34865, 34866, 34867)  # standard output sensitivity, recommended exposure index, ISO speed
 MAX_SIDE = 65535  # pixels that LibRaw opens
 MAX_REPEAT = 16  # rows and columns of a pattern of black levels; LibRaw rounds them and keeps 2 x 2
@@ -117,9 +119,16 @@ def mosaic_tags(raw: Raw) -> tuple[Tag, ...]:
 
 
 def exif_tags(raw: Raw) -> tuple[Tag, ...]:
-    """Tags of the EXIF directory: what the source said, and the ISO as the integer that the tag holds."""
-    iso = whole_iso(raw.iso)
-    return merged((Tag(EXIF_ISO, SHORT, (iso,)),) if iso > 0 else (), raw.metadata.exif)
+    """Tags of the EXIF directory: what the source said, and the ISO as the integer that the tag holds.
+
+    More than it holds stands in RecommendedExposureIndex, unless the source said it (EXIF 2.3, 4.6.5).
+    """
+    iso, said = whole_iso(raw.iso), {tag.code for tag in raw.metadata.exif}
+    own: tuple[Tag, ...] = (Tag(EXIF_ISO, SHORT, (iso,)),) if iso > 0 else ()
+    if raw.iso > MAX_EXIF_ISO and not said.intersection(LARGE_ISOS):
+        own += (Tag(SENSITIVITY_TYPE, SHORT, (_TYPE_RECOMMENDED,)),)
+        own += (Tag(RECOMMENDED_INDEX, LONG, (round(min(raw.iso, _MAX_LONG)),)),)
+    return merged(own, raw.metadata.exif)
 
 
 def whole_iso(iso: float) -> int:
