@@ -317,6 +317,34 @@ def test_too_few_still_frames_for_the_noisy_ones_are_named(clean: Raw, tmp_path:
         burst_testset(tmp_path / "a", tmp_path / "set", frames=3)
 
 
+@pytest.mark.parametrize(
+    ("name", "iso", "times"),
+    [
+        ("pixel6", 400, None),
+        ("pixel6", 25600, None),
+        ("galaxy-s22", 1600, 0.5),
+        ("pixel9-pro-tele", 1600, 0.3),
+    ],
+)
+def test_noise_that_is_not_that_of_the_profile_is_said(clean: Raw, tmp_path: Path, capsys, name, iso, times):
+    """Any camera's profile was taken for the bursts of any other, without a word."""
+    _burst(tmp_path / "captures/star/1lux", clean, iso=iso)
+    out = str(tmp_path / "out")
+    main(["testset", "from-bursts", str(tmp_path / "captures"), "-o", out, "--camera", name, "--quiet"])
+    said = " ".join(capsys.readouterr().err.split())
+    assert ("states another noise than 1 of 1 bursts have" in said) == (times is not None)
+    if times:
+        found = float(said.partition("that of star/1lux has ")[2].split()[0])
+        assert found == pytest.approx(times, rel=0.4)
+
+
+def test_captures_of_another_pattern_than_the_profiles_are_said(clean: Raw, tmp_path: Path):
+    _burst(tmp_path / "captures/star/1lux", replace(clean, cfa="RGGB"))
+    lines: list[str] = []
+    burst_testset(tmp_path / "captures", tmp_path / "out", camera="pixel6", note=lines.append)
+    assert f"its CFA and white level are RGGB and 1023, those of profile pixel6 {PROFILE.cfa}" in lines[0]
+
+
 def test_a_frame_whose_noise_nothing_tells_is_named(clean: Raw, tmp_path: Path, monkeypatch):
     def no_smooth_part(raw: Raw) -> None:
         raise FsidError("no smooth part")

@@ -11,7 +11,7 @@ from tyro.conf import Positional, arg
 
 from fsid.cli.arguments import Output
 from fsid.cli.iso_notes import note_files
-from fsid.cli.notes import note_unread
+from fsid.cli.notes import note, note_unread
 from fsid.cli.progress import progress_bar
 from fsid.cli.tables import print_table
 from fsid.errors import FsidError
@@ -68,6 +68,7 @@ def testset(
     _check_options(source, {"iso": iso, "lux": lux, "material": material}, given)
     if source != "from-bursts":
         camera = camera or "pixel6"
+    lines: list[str] = []
     if source == "simulate":
         with progress_bar("materials", "pictures", quiet=quiet) as progress:
             made = simulated_testset(
@@ -81,7 +82,9 @@ def testset(
             )
     elif source == "from-bursts":
         with progress_bar("bursts", "bursts", quiet=quiet) as progress:
-            made, found = burst_testset(folders[0], output, camera=camera, progress=progress, **given)
+            made, found = burst_testset(
+                folders[0], output, camera=camera, progress=progress, note=lines.append, **given
+            )
         print_table(_table(found))
     else:
         isos = iso if iso or lux else DEFAULT_ISOS
@@ -90,6 +93,8 @@ def testset(
                 folders, output, camera=camera, isos=isos, luxes=lux, progress=progress, **given
             )
         note_unread(folders)  # not before: what is wrong is one line
+    for line in lines:
+        note(line)
     if camera:
         note_files(camera, made.captures(output))
 

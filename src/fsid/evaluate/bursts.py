@@ -12,12 +12,13 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, fields, replace
 from pathlib import Path
 
 from fsid.errors import FsidError
 from fsid.evaluate.alignment import LEAST_FRAMES, align, check_setting, read_first
+from fsid.evaluate.burst_noise import times_stated, unlike_notes
 from fsid.evaluate.burst_truth import TruthQuality, average, cut
 from fsid.evaluate.testset import Progress, TestImage, TestSet, staged, write_testset
 from fsid.files import write_atomically
@@ -33,7 +34,7 @@ from fsid.sensor import (
     write_dng,
 )
 from fsid.sensor.blind import stated_noise
-from fsid.sensor.dng import read_header
+from fsid.sensor.dng import read_header, read_stored
 from fsid.sensor.frames import BESIDE_RAW
 from fsid.sensor.quantise import MAX_DN
 
@@ -48,11 +49,13 @@ def burst_testset(
     camera: str | Path = "",
     frames: int = 1,
     progress: Progress = lambda done, total: None,
+    note: Callable[[str], None] = lambda line: None,
 ) -> tuple[TestSet, list[TruthQuality]]:
     """Make a test set of every burst below `captures`, and say how good its truths are (truth.csv in `out`).
 
     camera: noise profile of the captures; "" takes the files' NoiseProfile, or estimates the noise of each
-    frame. frames: noisy frames per burst. Raises FsidError that names the burst at fault.
+    frame. frames: noisy frames per burst. note: is told where the captures are not as `camera` says. Raises
+    FsidError that names the burst at fault.
     """
     if frames < 1:
         raise FsidError(f"--frames {frames}: at least one noisy frame per burst is needed")
@@ -64,7 +67,7 @@ def burst_testset(
         if missing := [level for level in levels if (scene, level) not in bursts]:
             raise FsidError(f"{captures / scene}: has no burst {missing[0]}; every scene needs every level")
     _check_stated(list(bursts.values()), camera)
-    qualities = []
+    qualities, ratios = [], []
     name = load_profile(camera).name if camera else ""
     images = tuple(TestImage(scene, scene) for scene in scenes)
     testset = TestSet(name, levels, images, 0, "", frames)  # refuses a list that cannot be one
@@ -80,12 +83,19 @@ def burst_testset(
                 raw = cut(read_raw(path), window)
                 name = name or raw.camera
                 target = root / scene / f"{level}.noisy{f'.{frame:02d}' if frame else ''}.dng"
-                write_dng(target, exact_levels(replace(raw, noise=_noise(raw, camera, path))))
+                raw = replace(raw, noise=_noise(raw, camera, path))
+                write_dng(target, exact_levels(raw))
+                if camera and frame == 0:
+                    ratios.append((times_stated(raw, truth, quality.error), f"{scene}/{level}"))
             qualities.append(quality)
         progress(len(bursts), len(bursts))
         testset = replace(testset, camera=name, notes=_notes(levels, qualities))
         write_testset(root, testset)
         write_atomically(root / "truth.csv", _csv(qualities).encode())
+    if camera:
+        first = next(iter(bursts.values()))[0]
+        for line in unlike_notes(load_profile(camera), read_stored(first), str(first), ratios):
+            note(line)
     return testset, qualities
 
 
