@@ -21,7 +21,7 @@ from fsid.render.shadows import Source
 from fsid.render.sky import _clouds, _lattice, angles, panorama
 from fsid.render.sky_sun import part_sun
 from fsid.scene import SceneConfig, sample
-from fsid.scene.model import ZERO, Background, Camera, Light, Sky, Transform, Vec3
+from fsid.scene.model import ZERO, Background, Camera, Light, Material, Sky, Transform, Vec3
 from render_scenes import (
     FROM_ABOVE,
     STILL,
@@ -133,7 +133,7 @@ def test_the_highlight_of_an_area_light_is_that_of_its_pieces(renderer: Renderer
     """Within a sixth of 64 small lights, also opposite a low viewer, where Fresnel's share changes most."""
     material = plain(ONE if layer == "metal" else (0.0, 0.0, 0.0), roughness=50, family=layer)
     if layer == "coat":
-        material = replace(plain((0.0, 0.0, 0.0)), clearcoat=1.0, clearcoat_roughness=0.5)
+        material = COAT
     sheet = Drawable(grid(8.0), STILL, (material,), 0, specular=0.04 * (layer == "body"), casts=False)
     light = panel((-1.9, 0.0, 0.7), (1.0, 0.0, -0.37), (0.8, 0.8), 1.0)
     ahead = np.array(light.direction) / np.linalg.norm(light.direction)
@@ -145,15 +145,69 @@ def test_the_highlight_of_an_area_light_is_that_of_its_pieces(renderer: Renderer
         for place in places.reshape(-1, 3)
         for share in [0.01 * float(-place @ ahead / np.linalg.norm(place))]
     )
-    far = (1e4, 1e4, 1e4)  # nothing of these lights comes back from there
     for elevation in np.radians([60.0, 30.0, 15.0]):
         place = (3 * float(np.cos(elevation)), 0.0, 3 * float(np.sin(elevation)))
         camera = Camera(place, (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 0.5, 4, 4)
         views = (view(sheet, lights=lights, camera=camera) for lights in ((), (light,), pieces))
         dark, shown, summed = (
-            draw(renderer, replace(what, room_size_m=far)).radiance[2, 2, 1] for what in views
+            draw(renderer, replace(what, room_size_m=FAR)).radiance[2, 2, 1] for what in views
         )
         np.testing.assert_allclose(shown - dark, summed - dark, rtol=1 / 6)
+
+
+FAR = (1e4, 1e4, 1e4)  # walls from which nothing of a light comes back
+BROAD = ((75, 0, 60), (75, 180, 30), (45, 120, 40), (45, 0, 15), (20, 0, 30))
+PEAK = ((75, 180, 75), (60, 180, 68), (60, 180, 60), (45, 180, 45))
+SHEEN = replace(plain((0.0, 0.0, 0.0)), sheen=1.0)
+COAT = replace(plain((0.0, 0.0, 0.0)), clearcoat=1.0, clearcoat_roughness=0.5)
+
+
+def elevated(elevation_deg: float, azimuth_deg: float, distance_m: float) -> Vec3:
+    elevation, azimuth = np.radians((elevation_deg, azimuth_deg))
+    flat = distance_m * np.cos(elevation)
+    x, y, z = flat * np.cos(azimuth), flat * np.sin(azimuth), distance_m * np.sin(elevation)
+    return float(x), float(y), float(z)
+
+
+@pytest.mark.parametrize(
+    ("material", "directions"),
+    [
+        (plain(ONE), BROAD),
+        (SHEEN, BROAD),
+        (plain(ONE, roughness=50, family="metal"), PEAK),
+        (COAT, PEAK),
+    ],
+    ids=["body", "sheen", "mirror", "coat"],
+)
+def test_a_small_panel_lights_as_a_point_of_its_intensity(
+    renderer: Renderer, material: Material, directions: tuple[tuple[float, float, float], ...]
+) -> None:
+    """directions: elevation of the viewer, azimuth and elevation of the light, degrees. The linearly
+    transformed cosine of a mirror or a coat is GGX around its highlight alone, where these are compared."""
+    sheet = Drawable(grid(8.0), STILL, (material,), 0, specular=0.0, casts=False)
+    for viewer, azimuth, elevation in directions:
+        camera = Camera(elevated(viewer, 0.0, 3.0), ZERO, (0.0, 1.0, 0.0), 0.5, 4, 4)
+        place = elevated(elevation, azimuth, 2.0)
+        x, y, z = place
+        lights = point_light(place, 1.0, 0.025), panel(place, (-x, -y, -z), (0.05, 0.05), 1 / 0.05**2)
+        point, area = (
+            draw(renderer, replace(view(sheet, lights=(light,), camera=camera), room_size_m=FAR)).radiance[
+                2, 2
+            ]
+            for light in lights
+        )
+        np.testing.assert_allclose(area, point, rtol=0.03, err_msg=f"{viewer}, {azimuth}, {elevation}")
+
+
+@pytest.mark.parametrize("viewer_deg", [80.0, 45.0, 10.0])
+def test_a_panel_over_all_of_the_sky_is_a_white_furnace_for_sheen(
+    renderer: Renderer, viewer_deg: float
+) -> None:
+    sheet = Drawable(grid(1.0), STILL, (replace(plain(ONE), sheen=1.0),), 0, specular=0.0, casts=False)
+    camera = Camera(elevated(viewer_deg, 0.0, 3.0), ZERO, (0.0, 1.0, 0.0), 0.5, 4, 4)
+    light = panel((0.0, 0.0, 0.05), (0.0, 0.0, -1.0), (60.0, 60.0), 1.0)
+    frame = draw(renderer, replace(view(sheet, lights=(light,), camera=camera), room_size_m=FAR))
+    np.testing.assert_allclose(frame.radiance, 1.0, rtol=0.01)
 
 
 def test_an_area_light_is_seen_and_mirrored(renderer: Renderer) -> None:

@@ -44,13 +44,14 @@ float coat_reflected(float alpha, vec3 n, vec3 v, vec3 l) {
     return clear_fresnel(c) * share;
 }
 
-// Cloth's fuzz of alpha 0.5 (Estevez and Kulla 2017) with the visibility of Neubelt and Pettineo (2013); f * cos.
+// Cloth's fuzz of alpha 0.5 (Estevez and Kulla 2017) with the visibility of Neubelt and Pettineo (2013); f, without
+// the cosine at the light.
 float fuzz(vec3 n, vec3 v, vec3 l) {
     float nl = max(dot(n, l), 0.0), nv = max(abs(dot(n, v)), 1e-3), nh = dot(n, normalize(v + l));
-    return (2.0 / PI) * max(1.0 - nh * nh, 0.0) * nl / (4.0 * max(nl + nv - nl * nv, 1e-3));
+    return (2.0 / PI) * max(1.0 - nh * nh, 0.0) / (4.0 * max(nl + nv - nl * nv, 1e-3));
 }
 
-// Share of light that it reflects: the integral of `fuzz`, fitted to 0.004.
+// Share of light that it reflects: the integral of `fuzz` times that cosine, fitted to 0.004.
 float fuzz_share(float nv) {
     float r = sqrt(nv);
     return 0.787036 + r * (-0.717702 + r * (-0.122279 + r * 0.137787));
@@ -137,12 +138,12 @@ vec3 returned(Light light, Sample p, Reflector b) {
 #if LOBES
     float coat_wide = min(sqrt(b.coat_alpha * b.coat_alpha + 0.25 * angular * angular), 1.0);
     result = result * b.below + b.through * unhindered * (smoothstep(-0.15, 0.0, -ahead) * max(-nl, 0.0) / PI)
-        + (b.coated * coat_reflected(coat_wide, b.n, b.v, l) + b.sheen * fuzz(b.n, b.v, l)) * arrives;
+        + (b.coated * coat_reflected(coat_wide, b.n, b.v, l) + b.sheen * max(nl, 0.0) * fuzz(b.n, b.v, l)) * arrives;
 #endif
 #if AREAS
     bool area = light.kind == AREA, seen = area && dot(to_light, light.direction) < 0.0;
-    float front = form_factor(light, p.position, b.facing, seen);
-    vec3 middle;
+    vec3 towards, middle;
+    float front = form_factor(light, p.position, b.facing, seen, towards);
     float glossy = form_factor(light, p.position, b.lobe, seen, middle);
     float slant = 1.0 - facets_at(b.lobe, middle, b.v), slant2 = slant * slant;
     vec3 there = b.rebound * b.whole * mix(b.f0, vec3(b.edge), slant2 * slant2 * slant);
@@ -151,7 +152,12 @@ vec3 returned(Light light, Sample p, Reflector b) {
     bool passes = max(b.through.r, max(b.through.g, b.through.b)) > 0.0;
     float in_coat = form_factor(light, p.position, b.coat_lobe, seen && b.coat > 0.0, middle);
     float coat_there = b.coat_whole * clear_fresnel(facets_at(b.coat_lobe, middle, b.v));
-    from_area = from_area * b.below + b.cloth * front + mix(coat_there, b.coat, in_coat) * in_coat
+    // The fuzz as it is at the middle of the light, and the more of all that the surface faces is light, the more as a
+    // whole. It is divided by that cosine already, which `front` has.
+    vec3 centre = towards * b.facing * inversesqrt(max(dot(towards, towards), 1e-30));
+    float fuzz_there = PI * b.sheen * fuzz(b.n, b.v, centre);
+    from_area = from_area * b.below + mix(fuzz_there, b.cloth, front) * front
+        + mix(coat_there, b.coat, in_coat) * in_coat
         + b.through * form_factor(light, p.position, flipped(b.facing), seen && passes);
 #endif
     result = area ? seen ? light.colour * from_area : vec3(0) : result;
