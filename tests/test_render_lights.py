@@ -527,17 +527,47 @@ def test_light_passes_through_a_translucent_sheet(renderer: Renderer) -> None:
 
 
 def test_glass_shows_what_is_behind_it(renderer: Renderer) -> None:
-    """A clear pane passes (1 - F)^2 of the floor's light, and the labels are the pane's."""
+    """A clear pane passes (1 - F) / (1 + F) of the floor's light, and the labels are the pane's."""
     glass = replace(plain(ONE, roughness=20), transmission=1.0)
     pane = Drawable(block((0.6, 0.6, 0.01)), Transform((0.0, 0.0, 0.5), (0, 0, 0), ONE), (glass,), 1)
     lights = (sun((0.6, 0.0, -0.8)),)
     frame = draw(renderer, view(lambertian(grid(6.0)), pane, lights=lights))
+    dark = draw(renderer, view(lambertian(grid(6.0), ZERO), pane, lights=lights))
     floor = 0.5 / np.pi * 2.0 * 0.8
     np.testing.assert_allclose(frame.radiance[4, 4], floor, rtol=5e-3)
-    np.testing.assert_allclose(frame.radiance[44:52, 44:52], 0.96**2 * floor, rtol=0.01)
+    passed = (frame.radiance - dark.radiance)[44:52, 44:52]
+    np.testing.assert_allclose(passed, 0.96 / 1.04 * floor, rtol=0.01)
     assert frame.object_id[48, 48] == 1
     assert frame.object_id[4, 4] == 0
     np.testing.assert_allclose(frame.depth[48, 48], 1.49, atol=1e-3)
+
+
+@pytest.mark.parametrize("roughness", [20, 50])
+@pytest.mark.parametrize(
+    "lobes",
+    [{"transmission": 1.0}, {"transmission": 0.7}, {"transmission": 1.0, "clearcoat": 1.0, "sheen": 0.5}],
+    ids=["clear", "milky", "coated"],
+)
+def test_glass_in_a_white_furnace(renderer: Renderer, lobes: dict[str, float], roughness: int) -> None:
+    """In surroundings of 1 a white pane shows 1 at any angle: what its two faces do not reflect passes."""
+    pane = Drawable(grid(3.0), STILL, (replace(plain(ONE, roughness=roughness), **lobes),), 0)
+    wall = lambertian(grid(60.0), ONE, at=replace(STILL, position_m=(0.0, 0.0, -2.0)), object_id=1)
+    for angle_deg in (0.0, 30.0, 60.0, 70.0, 80.0):
+        camera = Camera(elevated(90.0 - angle_deg, 0.0, 2.0), ZERO, (0.0, 1.0, 0.0), 2.0, 8, 8)
+        frame = draw(renderer, view(wall, pane, ambient=1.0, camera=camera))
+        assert (frame.object_id == 0).all()
+        np.testing.assert_allclose(frame.radiance, 1.0, rtol=0.01, err_msg=f"{angle_deg}")
+
+
+def test_coloured_glass_reflects_behind_its_colour(renderer: Renderer) -> None:
+    """White surroundings and a pane that keeps a of the light on one way through: its nearer face reflects F,
+    the farther one (1 - F)^2 a^2 F, and (1 - F)^2 a passes; the last two over 1 - a^2 F^2, for the echoes."""
+    colour, fresnel = np.array((0.9, 0.5, 0.1)), 0.04
+    pane = Drawable(grid(3.0), STILL, (replace(plain((0.9, 0.5, 0.1), roughness=20), transmission=1.0),), 0)
+    wall = lambertian(grid(60.0), ONE, at=replace(STILL, position_m=(0.0, 0.0, -2.0)), object_id=1)
+    shown = draw(renderer, view(wall, pane, ambient=1.0, camera=SMALL)).radiance[16, 16]
+    inside = (1 - fresnel) ** 2 * colour * (colour * fresnel + 1) / (1 - (colour * fresnel) ** 2)
+    np.testing.assert_allclose(shown, fresnel + inside, rtol=0.01)
 
 
 def test_glass_bends_rays_at_a_slant(renderer: Renderer) -> None:

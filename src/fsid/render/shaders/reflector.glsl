@@ -66,6 +66,9 @@ struct Reflector {
     float alpha, alpha2;  // GGX
     vec3 rebound;         // what one bounce between microfacets loses, given back (Turquin 2019)
     vec3 mirror;          // share of even surroundings that the GGX lobe reflects
+#if GLASS
+    vec3 clear;           // share of the light behind that passes
+#endif
 #if AREAS
     mat3 facing, lobe;    // bend directions so that the body's and the mirror's share of light is a cosine around z
     float whole, edge;    // of the mirror: share of even surroundings without Fresnel; reflectance at grazing angles
@@ -111,6 +114,18 @@ Reflector reflector_of(Sample p, Surface s, Matter m, float spread) {
     b.rebound = 1.0 + b.f0 * (1.0 / max(share.x + share.y, 0.1) - 1.0);
     float most = 50.0 * max(b.f0.r, max(b.f0.g, b.f0.b));
     b.mirror = b.rebound * (b.f0 * share.x + min(share.y, most));
+#if GLASS
+    // A slab with light to and fro between its faces (Stokes 1862); its colour is what is left after one way through.
+    vec3 way = m.albedo * (1.0 - b.mirror), echoes = max(1.0 - m.albedo * m.albedo * b.mirror * b.mirror, 1e-4);
+    float slab = s.transmission * (1.0 - m.metallic);
+    b.clear = slab * way * (1.0 - b.mirror) / echoes;
+    vec3 both_faces = 1.0 + slab * way * way / echoes;
+    b.mirror *= both_faces;
+    b.rebound *= both_faces;
+#if LOBES
+    b.clear *= b.below;
+#endif
+#endif
 #if AREAS
     b.facing = upright(b.n);
     b.whole = share.x + share.y;

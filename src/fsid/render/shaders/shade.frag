@@ -146,9 +146,7 @@ vec3 radiance(Sample p, Surface s, Matter m, float spread, inout bool missing) {
 #endif
     vec3 result = light + openness(blocks, p.depth) * surroundings;
 #if GLASS
-    float mirror = b.mirror.g / b.rebound.g;
-    float passes = s.transmission * (1.0 - m.metallic) * (1.0 - mirror) * (1.0 - mirror);
-    result += passes * m.albedo * seen_through(p, s, b.n, b.v);
+    result += b.clear * seen_through(p, s, b.n, b.v);
 #endif
     return result;
 }
