@@ -12,15 +12,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from PIL import Image
 
-from fsid.assets import MaterialMaps, build_mesh
+from fsid.assets import MaterialMaps, bake_material, build_mesh
 from fsid.cli.main import main
 from fsid.dataset import generate_config
 from fsid.dataset.attempt import Attempt
 from fsid.render.camera import lens_of
 from fsid.render.drawable import turn_about
 from fsid.render.gltf import LUMENS_PER_WATT, glb_bytes
-from fsid.render.gltf_textures import base_colour, boxed, normals
+from fsid.render.gltf_textures import base_colour, boxed, normals, roughness_metallic
 from fsid.render.parts import Surface, parts_of
 from fsid.scene import scene_from_json, scene_to_json
 from fsid.scene.model import Background, Camera, Light, Material, Object, Scene, Transform
@@ -189,6 +190,30 @@ def test_the_file_holds_the_scene_itself_and_is_the_same_every_time():
 def test_pictures_are_shared():
     few = document(glb_bytes(small_scene(), texture_size=64))
     assert len(few["images"]) == 5, "brick: colour, normal, finish; paint: colour, finish"
+
+
+def picture(data: bytes, texture: int) -> np.ndarray:
+    """(S, S, 3) uint8 of a texture of the file."""
+    found = document(data)
+    image = found["images"][found["textures"][texture]["source"]]
+    view = found["bufferViews"][image["bufferView"]]
+    (length,) = struct.unpack_from("<I", data, 12)
+    start = 20 + length + 8 + view["byteOffset"]
+    with Image.open(io.BytesIO(data[start : start + view["byteLength"]])) as opened:
+        assert image["mimeType"] == Image.MIME[opened.format or ""]
+        return np.asarray(opened.convert("RGB"))
+
+
+def test_relief_and_finish_are_read_back_as_they_were():
+    """JPEG keeps neither: no metal would come back as some."""
+    data = glb_bytes(small_scene(), texture_size=64)
+    maps = bake_material(BRICK.family, BRICK.variant, 64)
+    assert maps.metallic.max() == 0
+    row = next(m for m in document(data)["materials"] if m["name"].endswith("(brick)"))
+    finish = picture(data, row["pbrMetallicRoughness"]["metallicRoughnessTexture"]["index"])
+    assert finish[..., 2].max() == 0
+    np.testing.assert_array_equal(finish, roughness_metallic(maps, BRICK.roughness_scale))
+    np.testing.assert_array_equal(picture(data, row["normalTexture"]["index"]), normals(maps))
 
 
 def test_texture_coordinates_are_the_box_mapping():

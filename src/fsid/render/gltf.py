@@ -207,7 +207,7 @@ class _Document:
         family = (material.family, material.variant)
         inside, outside = textures.roughness_factors(material.roughness_scale)
         colour = self._texture(
-            ("colour", *family, material.colours), lambda: textures.base_colour(maps, material)
+            ("colour", *family, material.colours), lambda: textures.base_colour(maps, material), textures.jpeg
         )
         surface: dict[str, Any] = {
             "roughnessFactor": outside,
@@ -215,12 +215,12 @@ class _Document:
             "baseColorTexture": colour,
         }
         surface["metallicRoughnessTexture"] = self._texture(
-            ("roughness", *family, inside), lambda: textures.roughness_metallic(maps, inside)
+            ("roughness", *family, inside), lambda: textures.roughness_metallic(maps, inside), textures.png
         )
         row: dict[str, Any] = {"name": f"{name} ({material.family})", "pbrMetallicRoughness": surface}
         row["doubleSided"] = material.transmission <= 0
         if material.relief_scale > 0 and not textures.is_flat(textures.normals(maps)):
-            relief = self._texture(("normal", *family), lambda: textures.normals(maps))
+            relief = self._texture(("normal", *family), lambda: textures.normals(maps), textures.png)
             row["normalTexture"] = relief | {"scale": material.relief_scale}
         if material.emission > 0:
             row |= {"emissiveTexture": colour, "emissiveFactor": [1.0, 1.0, 1.0]}
@@ -237,13 +237,16 @@ class _Document:
             self._maps = (key, bake_material(*key, self._texture_size))
         return self._maps[1]
 
-    def _texture(self, key: Hashable, pixels: Callable[[], np.ndarray]) -> dict[str, Any]:
+    def _texture(
+        self, key: Hashable, pixels: Callable[[], np.ndarray], encoded: Callable[[np.ndarray], bytes]
+    ) -> dict[str, Any]:
         """A reference to a picture, which is made once; one of a single colour has a single pixel block."""
         if key not in self._shared:
             picture = pixels()
             if textures.is_flat(picture):
                 picture = np.broadcast_to(np.rint(picture.mean((0, 1))), (8, 8, 3)).astype(np.uint8)
-            image = {"bufferView": self._view(textures.encoded(picture)), "mimeType": "image/jpeg"}
+            kind = "image/png" if encoded is textures.png else "image/jpeg"
+            image = {"bufferView": self._view(encoded(picture)), "mimeType": kind}
             source = self._add("images", image)
             self._shared[key] = self._add("textures", {"sampler": 0, "source": source})
         return {"index": self._shared[key]}
