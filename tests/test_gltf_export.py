@@ -19,9 +19,11 @@ from fsid.cli.main import main
 from fsid.dataset import generate_config
 from fsid.dataset.attempt import Attempt
 from fsid.render.camera import lens_of
-from fsid.render.drawable import turn_about
+from fsid.render.drawable import object_drawables, turn_about
+from fsid.render.geometry import merge
 from fsid.render.gltf import LUMENS_PER_WATT, glb_bytes
 from fsid.render.gltf_textures import base_colour, boxed, normals, roughness_metallic
+from fsid.render.layers import Layer
 from fsid.render.parts import Surface, parts_of
 from fsid.scene import scene_from_json, scene_to_json
 from fsid.scene.model import Background, Camera, Light, Material, Object, Scene, Transform
@@ -153,6 +155,25 @@ def test_every_lobe_is_said(change: dict, extension: str):
     found = document(glb_bytes(small_scene(replace(BRICK, **change)), texture_size=64))
     assert extension in found["extensionsUsed"]
     assert any(extension in material.get("extensions", {}) for material in found["materials"])
+
+
+def test_glass_is_as_thick_as_ours():
+    """Each of three mugs of one glass as `merge` has it for the rasteriser."""
+    glass = replace(PAINT, transmission=0.9)
+    scene = small_scene(glass)
+    scales = ((1.0, 1.5, 0.7), (-0.5, 2.0, 2.0), (3.0, 3.0, 3.0))
+    places = tuple(replace(scene.transforms[0], scale=scale) for scale in scales)
+    scene = replace(scene, objects=scene.objects * 3, materials=scene.materials * 3, transforms=places)
+    found = document(glb_bytes(scene, texture_size=64))
+    merged = merge(object_drawables(scene), lambda material: Layer(0, 1.0, np.ones(3), 0.5, 0.0), 0.0)
+    for number in range(3):
+        ours = merged.surfaces["thickness_m"][merged.surfaces["object_id"] == number + 1]
+        mesh = next(m for m in found["meshes"] if m["name"].startswith(f"object {number}:"))
+        for primitive in mesh["primitives"]:
+            added = found["materials"][primitive["material"]]["extensions"]
+            np.testing.assert_allclose(
+                added["KHR_materials_volume"]["thicknessFactor"], ours.mean(), rtol=1e-6
+            )
 
 
 def test_sheen_is_as_wide_as_ours():

@@ -43,6 +43,9 @@ UNMOVED = Motion()
 CLEAR = 0.5
 """Transmission from which a material is drawn as glass, behind which the rest of the scene is seen."""
 
+_GLASS_SHARE = 0.3
+"""Thickness of glass relative to the smallest side of what it is a part of: most are hollow."""
+
 
 @dataclass(frozen=True, eq=False)
 class Display:
@@ -77,6 +80,10 @@ class Drawable:
         rotation = rotation_matrix(*self.transform.rotation_deg)
         position = np.array(self.transform.position_m) + np.array(self.motion.velocity_m_s) * time_s
         return turn_about(self.motion.spin_deg_s, time_s) @ rotation, position
+
+    def thickness_m(self, extent: np.ndarray) -> float:
+        """Of its glass; extent: (3,) sides of the box around its mesh."""
+        return float(_GLASS_SHARE * np.abs(extent * self.transform.scale).min())
 
     @property
     def is_glass(self) -> bool:

@@ -96,7 +96,7 @@ def merge(drawables: Sequence[Drawable], layer_of: Callable[[Material], Layer], 
         numbers = np.arange(number, number + len(clear), dtype=np.uint32) | clear << 31
         whole.vertices["surface"][rows] = numbers.take(shape.part)
         np.add(shape.indices, np.uint32(vertex), out=whole.indices[index:last])
-        thickness_m = _GLASS_SHARE * np.abs((shape.high - shape.low) * drawable.transform.scale).min()
+        thickness_m = drawable.thickness_m(shape.high - shape.low)
         for material in drawable.materials:
             surface = _surface(drawable, material, layer_of(material), thickness_m)
             surface["place"][:, :3], surface["place"][:, 3] = rotation, position
@@ -199,9 +199,6 @@ def _surface(drawable: Drawable, material: Material, layer: Layer, thickness_m: 
     surface["thickness_m"] = thickness_m
     return surface
 
-
-_GLASS_SHARE = 0.3
-"""Thickness of glass relative to the smallest side of what it is a part of: most are hollow."""
 
 _SMOOTHEST = 0.18
 """MIN_ROUGHNESS in shaders/material.glsl: bounds the highlights of lights without size."""

@@ -166,7 +166,7 @@ class _Document:
 
     def _primitive(self, part: Part) -> dict[str, Any]:
         boxed = textures.boxed(part.surface, part.material)
-        material = self._material(part.material, part.name)
+        material = self._material(part)
         attributes = {
             "POSITION": self._accessor(boxed.positions, limits=True),
             "NORMAL": self._accessor(boxed.normals),
@@ -196,13 +196,14 @@ class _Document:
         self._binary += data
         return self._add("bufferViews", row | ({"target": target} if target else {}))
 
-    def _material(self, material: Material, name: str) -> int:
-        key = ("material", material, name)
+    def _material(self, part: Part) -> int:
+        thickness_m = part.thickness_m if part.material.transmission > 0 else 0.0
+        key = ("material", part.material, part.name, thickness_m)
         if key not in self._shared:
-            self._shared[key] = self._add("materials", self._look(material, name))
+            self._shared[key] = self._add("materials", self._look(part.material, part.name, thickness_m))
         return self._shared[key]
 
-    def _look(self, material: Material, name: str) -> dict[str, Any]:
+    def _look(self, material: Material, name: str, thickness_m: float) -> dict[str, Any]:
         maps = self._maps_of(material)
         family = (material.family, material.variant)
         inside, outside = textures.roughness_factors(material.roughness_scale)
@@ -224,7 +225,7 @@ class _Document:
             row["normalTexture"] = relief | {"scale": material.relief_scale}
         if material.emission > 0:
             row |= {"emissiveTexture": colour, "emissiveFactor": [1.0, 1.0, 1.0]}
-        found = textures.extensions(material, colour)
+        found = textures.extensions(material, colour, thickness_m)
         if found:
             self._extensions |= found.keys()
             row["extensions"] = found

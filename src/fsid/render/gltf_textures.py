@@ -125,9 +125,9 @@ def png(pixels: np.ndarray) -> bytes:
     return buffer.getvalue()
 
 
-def extensions(material: Material, colour: dict[str, Any]) -> dict[str, Any]:
+def extensions(material: Material, colour: dict[str, Any], thickness_m: float) -> dict[str, Any]:
     """KHR extensions for the lobes beyond metallic-roughness that the material has. colour: its base colour,
-    a reference to a texture, which also tints what goes through."""
+    a reference to a texture, which also tints what goes through. thickness_m: of its glass."""
     out: dict[str, Any] = {}
     if material.clearcoat > 0:
         out["KHR_materials_clearcoat"] = {
@@ -142,7 +142,7 @@ def extensions(material: Material, colour: dict[str, Any]) -> dict[str, Any]:
     if material.transmission > 0:
         out["KHR_materials_transmission"] = {"transmissionFactor": material.transmission}
         out["KHR_materials_ior"] = {"ior": 1.5}
-        out["KHR_materials_volume"] = {"thicknessFactor": 0.005}
+        out["KHR_materials_volume"] = {"thicknessFactor": thickness_m}
     if material.translucency > 0:
         out["KHR_materials_diffuse_transmission"] = {
             "diffuseTransmissionFactor": material.translucency,

@@ -27,7 +27,8 @@ class Surface:
 @dataclass(frozen=True, eq=False)
 class Part:
     """One part of one body: its triangles in metric space (scaled, not turned), and where that is in the
-    world: rotation (3, 3) @ vertex + position (3,). body and name: of the mesh and of its part."""
+    world: rotation (3, 3) @ vertex + position (3,). body and name: of the mesh and of its part.
+    thickness_m: of its glass."""
 
     surface: Surface
     rotation: np.ndarray
@@ -36,6 +37,7 @@ class Part:
     object_id: int
     body: str
     name: str
+    thickness_m: float
 
 
 def parts_of(scene: Scene, time_s: float) -> Iterator[Part]:
@@ -50,6 +52,7 @@ def _parts(drawable: Drawable, body: str, time_s: float) -> Iterator[Part]:
     rotation, position = drawable.pose(time_s)
     normals = mesh.normals / scale
     normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    thickness_m = drawable.thickness_m(np.ptp(mesh.vertices, axis=0))
     onwards = int(np.sign(scale).prod())  # -1: a mirrored triangle goes round the other way
     for number, (material, name) in enumerate(zip(drawable.materials, mesh.part_names, strict=True)):
         used, corners = np.unique(mesh.faces[mesh.face_parts == number], return_inverse=True)
@@ -57,4 +60,4 @@ def _parts(drawable: Drawable, body: str, time_s: float) -> Iterator[Part]:
             surface = Surface(
                 mesh.vertices[used] * scale, normals[used], corners.reshape(-1, 3)[:, ::onwards]
             )
-            yield Part(surface, rotation, position, material, drawable.object_id, body, name)
+            yield Part(surface, rotation, position, material, drawable.object_id, body, name, thickness_m)
