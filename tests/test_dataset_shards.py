@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import errno
 import io
+import shutil
+import subprocess
 import tarfile
 import weakref
 from pathlib import Path
@@ -11,7 +13,14 @@ from pathlib import Path
 import pytest
 
 from fsid.dataset import read_member, shard_keys, shard_path, write_shard
-from fsid.dataset.shards import each_sample, find_shards, read_samples
+from fsid.dataset.shards import (
+    count_whole,
+    each_sample,
+    find_shards,
+    read_heads,
+    read_records,
+    read_samples,
+)
 from fsid.errors import FsidError
 
 
@@ -142,3 +151,55 @@ def test_a_strangers_shard_is_read_or_named(tmp_path: Path, first: bytes, reads:
     for read in (read_samples, shard_keys):
         with pytest.raises(FsidError, match=r"shard-00000\.tar: is not a readable shard"):
             read(path)
+
+
+@pytest.mark.parametrize("kind", ["flipped bit", "zeros"])
+def test_a_damaged_header_is_no_end(tmp_path: Path, kind: str):
+    """`tarfile` reads what stands before it, and the samples behind were gone without a word."""
+    path = shard_path(tmp_path, 0)
+    write_shard(path, [(f"{i:08d}", {"clean.dng": bytes([i]) * 12000, "json": b"{}"}) for i in range(4)])
+    whole = bytearray(path.read_bytes())
+    with tarfile.open(path) as tar:
+        start = tar.getmember("00000002.clean.dng").offset
+    if kind == "zeros":  # as of a copy that was stopped on a file system that had reserved the size
+        whole[start:] = bytes(len(whole) - start)
+    else:
+        whole[start + 3] ^= 1
+    path.write_bytes(whole)
+    for read in (read_samples, shard_keys, count_whole, lambda path: list(read_records(path))):
+        with pytest.raises(FsidError, match=rf"not a readable shard \(at byte {start} .*; delete it"):
+            read(path)
+
+
+def test_a_tar_ends_with_zeros_up_to_a_whole_record(tmp_path: Path):
+    """As tarfile, webdataset and GNU tar write it; a tar that was cut behind a file has none."""
+    path = shard_path(tmp_path, 0)
+    for size in range(0, 10240, 512):
+        write_shard(path, [("a", {"bin": bytes(size), "json": b"{}"})])
+        assert path.stat().st_size % tarfile.RECORDSIZE == 0
+        assert shard_keys(path) == ["a"]
+    path.write_bytes(path.read_bytes()[: size + 3 * 512])
+    assert count_whole(path) == 1
+
+
+@pytest.mark.parametrize("size", [0, 9 << 10])
+def test_tars_that_were_joined_are_read_whole_or_named(tmp_path: Path, size: int):
+    """`cat` leaves the end of the first, where `tarfile` stops; GNU tar -A writes over it, and more zeros."""
+    catted, appended, other = (shard_path(tmp_path, number) for number in range(3))
+    write_shard(appended, [("a", {"json": bytes(size)})])
+    write_shard(other, [("b", {"json": bytes(size)})])
+    catted.write_bytes(appended.read_bytes() + other.read_bytes())
+    with pytest.raises(FsidError, match=r"shard-00000\.tar: is not a readable shard"):
+        shard_keys(catted)
+    tar = shutil.which("tar")
+    if not tar or subprocess.run([tar, "-Af", appended, other], capture_output=True).returncode:
+        pytest.skip("no GNU tar here")
+    assert shard_keys(appended) == ["a", "b"]
+
+
+def test_a_record_that_is_none_is_named_with_what_to_do(tmp_path: Path):
+    path = shard_path(tmp_path, 0)
+    write_shard(path, [("a", {"json": b'{"key": \0\0'})])
+    for read in (read_records, read_heads):
+        with pytest.raises(FsidError, match=r"a\.json: is not valid JSON .*; delete the shard and generate"):
+            list(read(path))

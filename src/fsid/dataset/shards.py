@@ -32,6 +32,9 @@ _HEAD_BYTES = 16384
 _LONG_PART = re.compile(rb', "(scene|settings)": \{')
 """Where in the JSON that FSID writes all else is said, and 200 kB may follow."""
 
+_MOST_END_BYTES = 2 * (tarfile.BLOCKSIZE + tarfile.RECORDSIZE)
+"""Two blocks of zeros end a tar and more fill its last record; GNU tar -A leaves up to a record beyond it."""
+
 
 def shard_path(folder: str | Path, number: int) -> Path:
     """Path of shard `number`."""
@@ -145,7 +148,14 @@ def read_record(data: bytes, where: str) -> dict[str, Any]:
 def read_records(path: Path) -> Iterator[dict[str, Any]]:
     """The content of the JSON of every sample of a shard. FsidError where it is not readable."""
     for name, data in read_files(path, ".json"):
-        yield read_record(data, f"{path}: {name}")
+        yield _stored_record(data, path, name)
+
+
+def _stored_record(data: bytes, path: Path, name: str) -> dict[str, Any]:
+    try:
+        return read_record(data, f"{path}: {name}")
+    except FsidError as error:
+        raise FsidError(f"{error}; delete the shard and generate again") from None
 
 
 def read_heads(path: Path) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -157,7 +167,7 @@ def read_heads(path: Path) -> Iterator[tuple[str, dict[str, Any]]]:
                 head = _content(tar, member, _HEAD_BYTES)
                 long = _LONG_PART.search(head) if head.startswith(b'{"key": ') else None
                 data = head[: long.start()] + b"}" if long else _content(tar, member)
-                yield member.name, read_record(data, f"{path}: {member.name}")
+                yield member.name, _stored_record(data, path, member.name)
 
 
 @contextmanager
@@ -182,17 +192,28 @@ def read_files(path: Path, suffix: str = "") -> Iterator[tuple[str, bytes]]:
 
 @contextmanager
 def open_shard(path: Path) -> Iterator[tuple[tarfile.TarFile, Iterator[tarfile.TarInfo]]]:
-    """A tar and its plain files, in order. FsidError where it is not readable.
+    """A tar and its plain files, in order. FsidError where it is not readable, or after the last file where
+    that is not the end.
 
     Links and sparse files, which may name each other or state any size, are none that FSID writes.
     """
     check_file(path)
     try:
         with tarfile.open(path, "r:") as tar:
-            yield tar, (member for member in tar if member.isreg() and not member.issparse())
+            yield tar, _plain_files(tar)
     except (OSError, tarfile.TarError, ValueError, OverflowError, RecursionError, MemoryError) as error:
         reason = str(error) or "a header states a size that no memory holds"
         raise FsidError(f"{path}: is not a readable shard ({reason}); delete it and generate again") from None
+
+
+def _plain_files(tar: tarfile.TarFile) -> Iterator[tarfile.TarInfo]:
+    """`tarfile` takes a damaged header for the end, and so it takes zeros in the place of one."""
+    yield from (member for member in tar if member.isreg() and not member.issparse())
+    assert tar.fileobj is not None
+    tar.fileobj.seek(tar.offset)
+    rest = tar.fileobj.read(_MOST_END_BYTES + 1)
+    if len(rest) > _MOST_END_BYTES or any(rest):
+        raise tarfile.ReadError(f"at byte {tar.offset} is neither a file nor the end of a tar")
 
 
 def _content(tar: tarfile.TarFile, member: tarfile.TarInfo, at_most: int = -1) -> bytes:
