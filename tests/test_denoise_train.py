@@ -812,6 +812,7 @@ def test_a_denoiser_from_pairs_for_something_else_is_said_to_be_one(
     task: str | None, data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = Path(shutil.copytree(data, tmp_path / "data"))
+    (folder / "README.md").touch()
     if task:
         save_settings(DatasetConfig(0, 4, GenerateConfig(task=task)), folder / "config.yaml")
     save_settings(replace(CONFIG, steps=1), tmp_path / "train.yaml")
@@ -845,12 +846,27 @@ def test_noise_of_other_cameras_than_those_of_the_dataset_is_said_to_be(
     folder = Path(shutil.copytree(data, tmp_path / "data"))
     if cameras:
         save_settings(DatasetConfig(0, 4, GenerateConfig(cameras=cameras)), folder / "config.yaml")
+        (folder / "README.md").touch()
     save_settings(replace(CONFIG, steps=1), tmp_path / "train.yaml")
     command = ["train", str(folder), "-o", str(tmp_path / "run"), "--config", str(tmp_path / "train.yaml")]
     main([*command, "--quiet", *(("--set", *given) if given else ())])
     said = " ".join(capsys.readouterr().err.split())
     line = "was made for mine.yaml; noise is drawn of pixel6, galaxy-s22: --set profiles=[mine.yaml]"
     assert (line in said, bool(said)) == (is_said, is_said)
+
+
+@pytest.mark.parametrize("lacks", ["config.yaml", "README.md", ""])
+def test_a_dataset_that_is_not_finished_is_said_to_be_so(
+    lacks: str, data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A folder of several datasets has neither settings nor a card."""
+    folder = Path(shutil.copytree(data, tmp_path / "data"))
+    save_settings(DatasetConfig(0, 4, GenerateConfig()), folder / "config.yaml")
+    (folder / "README.md").touch()
+    (folder / lacks).unlink() if lacks else None
+    save_settings(replace(CONFIG, steps=1), tmp_path / "train.yaml")
+    main(["train", str(folder), "-o", str(tmp_path / "run"), "--config", str(tmp_path / "train.yaml")])
+    assert ("has no README.md, which is there when" in capsys.readouterr().err) == (lacks == "README.md")
 
 
 def test_a_history_is_no_longer_than_a_checkpoint_can_hold() -> None:

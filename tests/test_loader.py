@@ -120,6 +120,20 @@ def test_headers_are_read_once_until_a_file_changes(dataset: Path, monkeypatch: 
     assert [mosaic.key[-1] for mosaic in index_mosaics(dataset)] == ["7", "8"]
 
 
+@pytest.mark.parametrize("processes", [0, 1])
+def test_a_shard_that_was_written_again_is_not_read_at_the_old_places(dataset: Path, processes: int) -> None:
+    """Near-duplicates are drawn again when all others are there, and a training may have begun."""
+    patches, mosaics = PatchDataset(dataset, CONFIG, seed=0), index_mosaics(dataset)
+    for shard in {mosaic.shard for mosaic in mosaics}:
+        samples = read_samples(shard)
+        write_shard(shard, [(key, {"json": bytes(5000)} | files) for key, files in samples.items()])
+    with pytest.raises(FsidError, match=r"^\S+shard-0000.\.tar: has changed .*; run the same command again$"):
+        next(batches(patches, range(4), processes))
+    with pytest.raises(FsidError, match="has changed"):
+        mosaics[0].levels()
+    index_mosaics(dataset)[0].levels()
+
+
 @pytest.mark.parametrize("cfa", CFA_PATTERNS)
 def test_a_patch_is_an_isometry_of_the_image_in_rggb_geometry(
     cfa: str, tmp_path: Path, rng: np.random.Generator

@@ -44,6 +44,8 @@ def train(
         quiet: No progress line; warnings are printed.
     """
     from fsid.config import given_keys
+    from fsid.dataset.card import CARD
+    from fsid.dataset.config import DATASET_FILE
     from fsid.dataset.index import task_of
     from fsid.denoise import train as train_network
     from fsid.denoise import train_config
@@ -62,6 +64,8 @@ def train(
     if task != "denoise" and is_main:
         line = f"{data} holds pairs for {task}, but this trains a denoiser: it takes their clean images alone"
         note(f"{line} and draws noise for them")
+    if is_main and (data / DATASET_FILE).exists() and not (data / CARD).exists():
+        note(f"{data} has no {CARD}, which is there when all pairs are; fsid generate is not done with it")
     command = shlex.join(["fsid", *sys.argv[1:]])
     model = train_network(data, output, settings, resume=resume, quiet=quiet, command=command)
     if not quiet and is_main:

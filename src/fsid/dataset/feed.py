@@ -29,7 +29,7 @@ def batches(
     A batch of other processes is valid until the next one is asked for: clone the tensors that are to be
     kept. (Clones of all of them cost an eighth of the patches per second, and training keeps none.)
     pin: into page-locked memory of its own, from which a GPU copies faster; it stays valid.
-    FsidError where shared memory has no room for them.
+    FsidError where shared memory has no room for them, or as `patches[step]`.
     """
     if not processes:
         made = (patches[step] for step in steps)
@@ -42,7 +42,7 @@ def batches(
             prefetch_factor=_AHEAD,
             worker_init_fn=_leave_signals_to_parent,
         )
-        made = (ring[slot] for slot in slots)
+        made = (ring[_checked(slot)] for slot in slots)
     for batch in made:
         yield batch.pin_memory() if pin else batch
 
@@ -58,8 +58,17 @@ def _leave_signals_to_parent(worker: int) -> None:
     signal.signal(signal.SIGTERM, lambda number, frame: os._exit(0))
 
 
-class _Slots(Dataset[int]):
-    """`slots[i]` fills the slot of the i-th step and says which one it is."""
+def _checked(slot: int | FsidError) -> int:
+    if isinstance(slot, FsidError):
+        raise slot
+    return slot
+
+
+class _Slots(Dataset[int | FsidError]):
+    """`slots[i]` fills the slot of the i-th step and says which one it is.
+
+    Bad input travels back as a value: PyTorch makes the traceback part of the line of what is raised.
+    """
 
     def __init__(self, patches: PatchDataset, steps: range, ring: list[Batch]) -> None:
         self._patches, self._steps, self._ring = patches, steps, ring
@@ -67,9 +76,12 @@ class _Slots(Dataset[int]):
     def __len__(self) -> int:
         return len(self._steps)
 
-    def __getitem__(self, place: int) -> int:
+    def __getitem__(self, place: int) -> int | FsidError:
         slot = place % len(self._ring)
-        self._patches.fill(self._ring[slot], self._steps[place])
+        try:
+            self._patches.fill(self._ring[slot], self._steps[place])
+        except FsidError as error:
+            return error
         return slot
 
 

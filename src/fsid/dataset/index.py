@@ -45,7 +45,7 @@ class StoredMosaic:
     """One mosaic inside a shard: (height, width) uint16 at byte `offset` of the file `shard`.
 
     noise: None where the DNG states none. scene: number of the scene or picture that it is from; split:
-    "train" or "validation", by scene.
+    "train" or "validation", by scene. stamp: of the file, before it was read.
     """
 
     shard: Path
@@ -59,10 +59,24 @@ class StoredMosaic:
     noise: NoiseLevel | None = None
     scene: int = 0
     split: str = "train"
+    stamp: tuple[int, ...] = ()
 
     def levels(self) -> np.ndarray:
-        """Its DN: (height, width) uint16, mapped from the file."""
-        return np.memmap(self.shard, "<u2", mode="r", offset=self.offset, shape=(self.height, self.width))
+        """Its DN: (height, width) uint16, mapped from the file. FsidError as `opened`."""
+        return self.in_map(self.opened())
+
+    def opened(self) -> np.ndarray:
+        """All bytes of the file, mapped. FsidError where it is not the one that was indexed: in a shard that
+        was written again pixels lie elsewhere."""
+        mapped = np.memmap(self.shard, np.uint8, mode="r").view(np.ndarray)
+        if stamp(self.shard) != self.stamp:
+            raise FsidError(f"{self.shard}: has changed since it was indexed; run the same command again")
+        return mapped
+
+    def in_map(self, mapped: np.ndarray) -> np.ndarray:
+        """Its DN: (height, width) uint16, of all bytes of the file."""
+        end = self.offset + 2 * self.height * self.width
+        return mapped[self.offset : end].view("<u2").reshape(self.height, self.width)
 
 
 def index_mosaics(data_dir: str | Path, kind: MosaicKind = "clean") -> tuple[StoredMosaic, ...]:
@@ -210,9 +224,10 @@ def _stated_origin(record: Mapping[str, Any]) -> tuple[str, str]:
 
 
 def _index_shard(shard: Path, suffix: str) -> list[StoredMosaic]:
+    stamped = stamp(shard)
     with open_shard(shard) as (_, plain):
         members = [member for member in plain if member.name.endswith(suffix)]
-    return [_read_header(shard, m, m.name.removesuffix(suffix)) for m in members]
+    return [replace(_read_header(shard, m, m.name.removesuffix(suffix)), stamp=stamped) for m in members]
 
 
 def _read_header(shard: Path, member: tarfile.TarInfo, key: str) -> StoredMosaic:

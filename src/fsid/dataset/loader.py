@@ -219,10 +219,8 @@ class PatchDataset(Dataset[Batch]):
         if mosaic.shard not in self._maps:
             if len(self._maps) == _OPEN_MAPS:
                 self._maps.popitem(last=False)
-            self._maps[mosaic.shard] = np.memmap(mosaic.shard, np.uint8, mode="r").view(np.ndarray)
-        end = mosaic.offset + 2 * mosaic.height * mosaic.width
-        pixels = self._maps[mosaic.shard][mosaic.offset : end].view("<u2")
-        return pixels.reshape(mosaic.height, mosaic.width)
+            self._maps[mosaic.shard] = mosaic.opened()
+        return mosaic.in_map(self._maps[mosaic.shard])
 
     def __getstate__(self) -> dict[str, object]:
         """A worker process opens its own maps: a pickled memmap would be a copy of the shard."""
