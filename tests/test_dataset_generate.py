@@ -145,10 +145,37 @@ def test_a_smaller_count_in_between_leaves_nothing_unfinished(photos: Path, tmp_
     assert (tmp_path / "README.md").read_text() == card
     shard_path(tmp_path, 1).unlink()
     (tmp_path / "README.md").unlink()
-    generate(tmp_path, config, count=1, shard_size=2)
-    assert "2 pairs for denoise" in (tmp_path / "README.md").read_text()  # what follows a gap is not settled
     assert generate(tmp_path, config, count=6, shard_size=2) == 2
     assert (tmp_path / "README.md").read_text() == card
+
+
+@pytest.mark.parametrize(("count", "gap"), [(1, 1), (2, 1), (3, 2), (4, 2)])
+def test_a_smaller_count_leaves_no_shards_beyond_a_gap(photos: Path, tmp_path: Path, count: int, gap: int):
+    """Workers of a larger run that was killed had made them: the card did not count what all readers take."""
+    config = small("width=64", "height=48", f"images={photos}")
+    generate(tmp_path, config, count=8, shard_size=2)
+    shard_path(tmp_path, gap).unlink()
+    (tmp_path / "README.md").unlink()
+    before = sorted(tmp_path.iterdir())
+    told = rf"{4 - gap - 1} shards? from shard-0000{gap + 1}\.tar on would lie beyond a gap"
+    with pytest.raises(FsidError, match=told):
+        generate(tmp_path, config, count=count, shard_size=2)
+    with pytest.raises(FsidError, match=told):
+        pairs_to_make(tmp_path, dataset_config(config, 0, 2), count)
+    assert sorted(tmp_path.iterdir()) == before
+    assert generate(tmp_path, config, count=2 * gap + 2, shard_size=2) == 2  # which closes it
+    assert "8 pairs for denoise" in (tmp_path / "README.md").read_text()
+
+
+def test_a_shard_that_is_not_full_is_a_gap(photos: Path, tmp_path: Path):
+    config = small("width=64", "height=48", f"images={photos}")
+    generate(tmp_path / "some", config, count=3, shard_size=2)
+    generate(tmp_path / "more", config, count=6, shard_size=2)
+    shutil.copy(shard_path(tmp_path / "more", 2), tmp_path / "some")
+    with pytest.raises(FsidError, match=r"1 shard from shard-00002\.tar on would lie beyond a gap"):
+        generate(tmp_path / "some", config, count=3, shard_size=2)
+    assert generate(tmp_path / "some", config, count=4, shard_size=2) == 1
+    assert "6 pairs for denoise" in (tmp_path / "some" / "README.md").read_text()
 
 
 def test_what_is_read_again_at_the_end_has_progress(photos: Path, scenes: Path, tmp_path: Path):

@@ -28,6 +28,7 @@ from fsid.dataset.tasks import SceneRenderer
 from fsid.dataset.worker import Worker
 from fsid.errors import FsidError, whole
 from fsid.files import held, stamp
+from fsid.plurals import counted
 
 SAMPLES_PER_WORKER = 320
 """After so many a worker is replaced, so that whatever a driver leaks stays small."""
@@ -126,14 +127,16 @@ def generate(
     another. finishing(done, total): shards that are read again when all are there, for near-duplicates and
     for the dataset card, README.md. looking(done, total): shards of which it is seen, at the start, whether
     they are whole. command: for the card.
-    Raises FsidError where `out` already holds a dataset of another configuration or seed, where another
-    process fills it, where the disk refuses, or where a shard kills its worker again and again.
+    Raises FsidError where `out` already holds a dataset of another configuration or seed, or shards of a
+    larger count that would stay incomplete, where another process fills it, where the disk refuses, or where
+    a shard kills its worker again and again.
     """
     count = check_count(count)
     out, workforce = Path(out), workforce or Workforce(workers)
     dataset = dataset_config(config, seed, shard_size)
     with _locked(out):
         begun, todo = _check_own(out, dataset), list(_missing(out, dataset, count, looking))
+        _check_unbroken(out, dataset.shard_size, count)
         if todo or not begun:
             check_card(out)
         if not begun:
@@ -183,6 +186,7 @@ def pairs_to_make(
     out, count = Path(out), check_count(count)
     _check_own(out, dataset)
     missing = list(_missing(out, dataset, count, looking))
+    _check_unbroken(out, dataset.shard_size, count)
     if missing:
         check_card(out)
     return sum(len(shard.indices) for shard in missing), len(missing)
@@ -222,17 +226,30 @@ def _check_own(out: Path, dataset: DatasetConfig) -> bool:
     return is_begun(out, dataset)
 
 
-def _unbroken(out: Path, size: int) -> Iterator[Path]:
-    """The shards from the first one on, up to one that is not full or not there.
+def _unbroken(out: Path, size: int, first: int = 0) -> Iterator[Path]:
+    """The shards from number `first` on, up to one that is not full or not there.
 
     Also those beyond the count that is asked for: once there is a card, a later run would not settle them.
     """
-    for path in (shard_path(out, number) for number in itertools.count()):
+    for path in (shard_path(out, number) for number in itertools.count(first)):
         if not path.exists():
             return
         yield path
         if count_whole(path) < size:
             return
+
+
+def _check_unbroken(out: Path, size: int, count: int) -> None:
+    """FsidError where shards of a larger count would lie beyond a gap when this one is made: they would not
+    be settled, nor counted by the card, but whatever reads the dataset would take them."""
+    first = count // size
+    settled = {*(shard_path(out, number) for number in range(first)), *_unbroken(out, size, first)}
+    beyond = [path.name for path in out.glob("shard-*.tar") if path not in settled]
+    if beyond:
+        raise FsidError(
+            f"{out}: {counted(len(beyond), 'shard')} from {min(beyond)} on would lie beyond a gap, of a "
+            "larger --count that was not finished; take that one again, or delete these shards"
+        )
 
 
 def _missing(
