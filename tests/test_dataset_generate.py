@@ -431,6 +431,22 @@ def test_an_iso_of_more_noise_than_light_is_named_before_anything_is_written(pho
     dataset_config(small("iso_range=[400,1e5]"), 0)
 
 
+def test_a_renderer_that_is_not_installed_is_named_before_anything_is_written(tmp_path: Path):
+    """From a worker it came as a traceback."""
+    (tmp_path / "mitsuba.py").write_text("raise ModuleNotFoundError(name='mitsuba')")
+    paths = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
+    options = ["--count", "1", "--width", "32", "--height", "32", "--renderer", "reference"]
+    ended = subprocess.run(
+        [sys.executable, "-m", "fsid", "generate", str(tmp_path / "out"), *options],
+        env={**os.environ, "PYTHONPATH": paths},
+        capture_output=True,
+        text=True,
+    )
+    told = "fsid: this command needs mitsuba, which is not installed: pip install 'fsid[reference]'\n"
+    assert (ended.returncode, ended.stderr) == (2, told)
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_folder_without_skies_is_named_before_anything_is_written(tmp_path: Path):
     """Not at the first scene in open air, which may be the thousandth."""
     skies = tmp_path / "skies"

@@ -9,6 +9,7 @@ below them (`fsid.scene.sources`).
 from __future__ import annotations
 
 import hashlib
+import importlib
 import os
 from collections.abc import Iterator
 from dataclasses import replace
@@ -58,8 +59,13 @@ def dataset_config(config: GenerateConfig, seed: int, shard_size: int = 0) -> Da
 
 
 def check_settings(config: GenerateConfig) -> None:
-    """FsidError where what `config` names does not exist, or its parts do not agree; reads no large file."""
+    """FsidError where what `config` names does not exist, or its parts do not agree; reads no large file.
+
+    ModuleNotFoundError where it takes a renderer that is not installed: from a worker it would be a bug.
+    """
     check_kind(config, GenerateConfig, "generate_config makes one of a file, a name or settings")
+    if config.renderer == "reference" and not config.images:
+        importlib.import_module("mitsuba")
     for camera in config.cameras:
         _check_noise(load_bayer_profile(camera), config.iso_range[1])
     check_cameras(config)
