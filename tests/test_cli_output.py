@@ -77,6 +77,21 @@ def test_an_interrupt_while_modules_are_read_is_one_line() -> None:
     assert (ended.returncode, ended.stderr) == (130, "fsid: interrupted\n")
 
 
+@pytest.mark.parametrize("options", ["--count 1", "--count 1 --dry-run", "--only 3", "--only=3", "--dry_run"])
+def test_only_what_keeps_something_goes_on_from_it(
+    options: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(cli, "_documented", interrupted)
+    with pytest.raises(SystemExit) as ended:
+        cli.main(["generate", "out", *options.split()])
+    assert ended.value.code == 130
+    hint = "; the same command goes on from what is finished" if options == "--count 1" else ""
+    assert capsys.readouterr().err == f"fsid: interrupted{hint}\n"
+
+
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no device that is always full")
 @pytest.mark.parametrize("arguments", [["--help"], ["profiles"], ["generate", "--help"]])
 def test_a_full_disk_under_the_output_is_one_line(arguments: list[str]) -> None:

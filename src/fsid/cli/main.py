@@ -65,6 +65,8 @@ DESCRIPTION = (
     "fsid COMMAND --help describes a command and its options."
 )
 RESUMABLE = {"generate", "train", "experiment", "demo"}
+FROM_THE_START = {"--dry-run", "--only"}
+"""With these `fsid generate` keeps nothing to go on from."""
 REPEATABLE = {"--model"}  # of evaluate
 OUTPUTS = {"-o", "--out", "--output"}
 """What some commands call their last place."""
@@ -175,7 +177,7 @@ def _run(arguments: Sequence[str] | None) -> None:
         _fail(str(error))
     except KeyboardInterrupt:
         what, code = ("terminated", 128 + _received[0]) if _received else ("interrupted", 130)
-        goes_on = set(given[:1]) & RESUMABLE
+        goes_on = RESUMABLE.intersection(given[:1]) and FROM_THE_START.isdisjoint(_options(given))
         hint = "; the same command goes on from what is finished" if goes_on else ""
         _tell(Text(f"fsid: {what}{hint}"))
         sys.exit(code)
@@ -211,16 +213,20 @@ def _is_read(stream: TextIO) -> bool:
     return not poll.poll(0)
 
 
+def _options(arguments: Sequence[str]) -> list[str]:
+    return [
+        argument.partition("=")[0].replace("_", "-")
+        for argument in arguments
+        if argument.startswith("-") and argument.lstrip("-")[:1].isalpha()
+    ]
+
+
 def _check_options(arguments: Sequence[str]) -> None:
     """Refuse an option that its command has not, and one that is given twice.
 
     Of `--set a=1 --set b=2` the parser would lose the first, and of `--cuont 3 OUT` it would miss OUT.
     """
-    names = [
-        argument.partition("=")[0].replace("_", "-")
-        for argument in arguments
-        if argument.startswith("-") and argument.lstrip("-")[:1].isalpha()
-    ]
+    names = _options(arguments)
     command = COMMANDS.get(arguments[0]) if arguments else None
     parameters = signature(command).parameters.values() if command else ()
     options = {f"--{p.name.replace('_', '-')}" for p in parameters if p.kind is p.KEYWORD_ONLY}
