@@ -6,9 +6,9 @@
 `held_out` the keys of its images that are for validation: those of a run's beginning stay so when the dataset
 grows. All three are absent in older runs.
 
-They stand apart from checkpoint and model, which hold what follows from settings and seed alone and so are
-the same bits on every run. A row is brought up to date with every checkpoint: what a kill loses of the
-time, it loses of the steps too.
+They stand apart from checkpoint and weights, which hold what follows from settings and seed alone and so are
+the same bits on every run on a CPU; the cards beside the weights repeat them. A row is brought up to date
+with every checkpoint: what a kill loses of the time, it loses of the steps too.
 """
 
 from __future__ import annotations
