@@ -51,21 +51,32 @@ def test_plain_webdataset_reads_it(data: Path) -> None:
 
 @pytest.mark.parametrize("streaming", [False, True])
 def test_hugging_face_datasets_reads_it(data: Path, streaming: bool, tmp_path: Path) -> None:
+    """It infers the form of all records from the first five, and a record is of what its scene has."""
     datasets = pytest.importorskip("datasets")
     datasets.disable_progress_bars()
+    stored = [files for number in range(2) for files in read_samples(shard_path(data, number)).values()]
+    kinds = [json.loads(files["json"])["scene"]["background"]["kind"] for files in stored]
+    first, other = kinds.index(kinds[0]), next(i for i, kind in enumerate(kinds) if kind != kinds[0])
+    in_order = [stored[first]] * 5 + [stored[other]]
+    write_shard(shard_path(tmp_path, 0), [(f"{i:08d}", files) for i, files in enumerate(in_order)])
+    columns = {"__key__": datasets.Value("string"), "__url__": datasets.Value("string")}
+    columns |= {"clean.dng": datasets.Value("binary"), "noisy.dng": datasets.Value("binary")}
     rows = datasets.load_dataset(
         "webdataset",
-        data_files={"train": str(data / "shard-*.tar")},
+        data_files={"train": str(tmp_path / "shard-*.tar")},
         split="train",
         streaming=streaming,
         cache_dir=str(tmp_path),
+        features=datasets.Features({**columns, "rgb.png": datasets.Image(), "json": datasets.Json()}),
     )
     samples = list(rows)
     assert [sample["__key__"] for sample in samples] == [f"{i:08d}" for i in range(6)]
     assert isinstance(samples[0]["rgb.png"], Image.Image)
-    assert {sample["json"]["split"] for sample in samples} == {"train", "validation"}
-    clean = samples[0]["clean.dng"]
-    with rawpy.imread(io.BytesIO(clean)) as raw:
+    for sample, files in zip(samples, in_order, strict=True):
+        texts = (json.dumps(sample["json"]), files["json"])
+        read, written = (json.loads(text, parse_float=lambda _: "rounded") for text in texts)
+        assert read == written
+    with rawpy.imread(io.BytesIO(samples[5]["clean.dng"])) as raw:
         assert raw.raw_image.shape == (48, 64)
 
 
