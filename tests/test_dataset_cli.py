@@ -15,6 +15,7 @@ import OpenEXR
 import pytest
 from PIL import Image
 
+from fsid import __version__
 from fsid.assets import mesh_sources, texture_sources
 from fsid.assets.survey import KNOWN
 from fsid.cli.libraries import read_libraries
@@ -83,6 +84,33 @@ def test_only_says_that_a_sample_is_not_there_yet(
     main([*words(data)[:1], str(out), *words(data)[2:], "--count", "6"])
     assert loose(out, "00000005") == read_samples(shard_path(out, 0))["00000005"]
     main(["generate", str(tmp_path / "fresh"), "--only", "0", "--images", str(data / "pictures")])
+    assert "note:" not in capsys.readouterr().err
+
+
+def test_another_version_of_fsid_is_told_and_the_card_counts_the_pairs_of_each(
+    data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its pairs may be of other scenes, and the card credited all of them to it."""
+    out = Path(shutil.copytree(data / "data", tmp_path / "data"))
+    grow = [*words(data)[:1], str(out), *words(data)[2:], "--count"]
+    samples = read_samples(shard_path(out, 0))
+    for files in samples.values():
+        files["json"] = files["json"].replace(b'"fsid_version": "', b'"fsid_version": "0.0.')
+    write_shard(shard_path(out, 0), samples.items())
+    made_by = f"0.0.{__version__}"
+    main([*grow, "5"])
+    assert "note:" not in capsys.readouterr().err  # nothing is to be made
+    for arguments in ([*grow, "6", "--dry-run"], [*grow, "6"]):
+        main(arguments)
+        told = f"note: {out} was begun by fsid {made_by}, this is {__version__}: its pairs may be of other "
+        assert capsys.readouterr().err == told + "scenes\n"
+    assert f"| version of fsid | {made_by} (5), {__version__} (1) pairs |" in (out / "README.md").read_text()
+    for only in ("00000002", str(out / "00000002.json")):
+        main(["generate", str(out), "--only", only, "--quiet"])
+        (out / "00000002.json").write_bytes(samples["00000002"]["json"])
+        assert f"was made by fsid {made_by}, this is {__version__}: its" in capsys.readouterr().err
+    monkeypatch.setattr("fsid.cli.generate.__version__", made_by)
+    main([*grow, "7"])
     assert "note:" not in capsys.readouterr().err
 
 

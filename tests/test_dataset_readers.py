@@ -145,7 +145,7 @@ def test_the_card_counts_pictures_once_and_has_nothing_of_scenes_where_there_are
         Image.fromarray(rng.integers(40, 200, (64, 64, 3), np.uint8)).save(tmp_path / f"{i}.png")
     generate(tmp_path / "data", GenerateConfig(images=str(tmp_path), width=32, height=32), count=5)
     card = (tmp_path / "data" / "README.md").read_text()
-    assert "5 pairs for denoise, 32 x 32 pixels at most, from 2 pictures (fsid" in card
+    assert "5 pairs for denoise, 32 x 32 pixels at most, from 2 pictures (seed 0)" in card
     assert "| variant |" not in card
     assert "| backgrounds |" not in card
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import Positional, arg
 
+from fsid import __version__
 from fsid.cli.arguments import Settings, overrides
 from fsid.cli.iso_notes import note_extrapolation
 from fsid.cli.libraries import read_libraries
@@ -90,6 +91,7 @@ def generate(
     from fsid.config import given_keys
     from fsid.dataset import (
         Workforce,
+        begun_by,
         check_count,
         check_given,
         check_settings,
@@ -138,11 +140,14 @@ def generate(
     if not settings.images:
         read_libraries(settings.scene, quiet=quiet)
     dataset = dataset_config(settings, seed)
+    there = pairs_there(out, dataset.shard_size) if is_begun(out, dataset) else 0
+    begun = begun_by(out) if 0 < there < count else ""
+    if begun not in ("", __version__):
+        note(f"{out} was begun by fsid {begun:.40}, this is {__version__}: its pairs may be of other scenes")
     if dry_run:
         plan = _plan(out, settings, dataset, count, workforce, quiet=quiet)
         Terminal(markup=False).print(plan, soft_wrap=True)
     else:
-        there = pairs_there(out, dataset.shard_size) if is_begun(out, dataset) else 0
         if there < count:
             _check_sources(settings, range(there, count), workforce, quiet=quiet)
         made = _make(out, settings, count, seed, workforce, quiet=quiet)

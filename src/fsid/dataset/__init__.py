@@ -5,7 +5,7 @@ from fsid.dataset.config import RENDERED, DatasetConfig, GenerateConfig, generat
 from fsid.dataset.contact_sheet import contact_sheet, grid
 from fsid.dataset.estimate import Estimate, estimate
 from fsid.dataset.generate import Workforce, check_count, generate, pairs_there, pairs_to_make
-from fsid.dataset.identity import check_settings, dataset_config, is_begun
+from fsid.dataset.identity import begun_by, check_settings, dataset_config, is_begun
 from fsid.dataset.photos import find_photos, read_photo
 from fsid.dataset.pictures import check_pictures, find_pictures
 from fsid.dataset.png import check_png, save_png, to_uint8
@@ -22,6 +22,7 @@ __all__ = [
     "GenerateConfig",
     "Sample",
     "Workforce",
+    "begun_by",
     "check_count",
     "check_given",
     "check_pictures",

@@ -19,7 +19,6 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from fsid import __version__
 from fsid.assets.file_names import PREFIX
 from fsid.assets.sources import licence_beside, split_source, survey_meshes
 from fsid.dataset.config import DATASET_FILE, DatasetConfig
@@ -53,6 +52,7 @@ class _Tally:
     def add(self, record: dict[str, Any]) -> None:
         self._count("split", record["split"])
         self._count("camera", record["camera"])
+        self._count("version", record.get("fsid_version", "unknown"))
         self.isos.append(float(record["iso"]))
         if record["frame"] in self.frames:
             return
@@ -133,7 +133,7 @@ def _text(dataset: DatasetConfig, tally: _Tally, statistics: Sequence[str], comm
         _TITLE,
         "",
         f"{counted(len(tally.isos), 'pair')} for {config.task}, {size} pixels at most, from {sources} "
-        f"(fsid {__version__}, seed {dataset.seed}). "
+        f"(seed {dataset.seed}). "
         "WebDataset shards; `config.yaml` has every setting, each pair's JSON all that makes it again.",
         "",
         "Noise of a pair: `Var(x) = k x + sigma2` with `k` and `sigma2` of its JSON, of R, Gr (in rows with "
@@ -145,6 +145,7 @@ def _text(dataset: DatasetConfig, tally: _Tally, statistics: Sequence[str], comm
         "|---|---|",
         *(f"| {name} | {counted(count, 'pair')} |" for name, count in sorted(splits.items())),
         f"| cameras | {_listed(tally.counts['camera'], 'pairs')} |",
+        f"| version of fsid | {_listed(tally.counts['version'], 'pairs')} |",
         f"| ISO | {lowest:.0f} to {highest:.0f}, median {middle:.0f} |",
         *of_scenes,
         f"| refused by the checks | {refused.total()} of {drawn} frames: {_listed(refused, 'times')} |",

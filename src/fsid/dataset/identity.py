@@ -24,6 +24,7 @@ from fsid.assets.textures import texture_files
 from fsid.config import from_plain, to_plain
 from fsid.dataset.config import DATASET_FILE, RENDERED, DatasetConfig, GenerateConfig
 from fsid.dataset.pictures import find_pictures, pictures_digest
+from fsid.dataset.shards import read_heads
 from fsid.dataset.tasks import check_cameras, check_task
 from fsid.errors import FsidError, check_kind
 from fsid.scene import SceneConfig
@@ -138,6 +139,13 @@ def is_begun(out: str | Path, dataset: DatasetConfig) -> bool:
         f"{out}: already holds another dataset; these differ: {keys}. "
         "Use another folder, or the same settings"
     )
+
+
+def begun_by(out: str | Path) -> str:
+    """The version of FSID that the first pair in `out` states; "" where there is none."""
+    shards = sorted(Path(out).glob("shard-*.tar"))
+    _, head = next(read_heads(shards[0]), ("", {})) if shards else ("", {})
+    return str(head.get("fsid_version", ""))
 
 
 def _used(dataset: DatasetConfig) -> DatasetConfig:

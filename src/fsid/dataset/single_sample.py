@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from fsid import __version__
 from fsid.config import from_plain
 from fsid.dataset.attempt import SAMPLE_KEY, Sample, sample_key
 from fsid.dataset.config import DATASET_FILE, DatasetConfig, GenerateConfig
@@ -29,12 +30,13 @@ def make_only(
 
     key: of a sample, or the path of its .json. config, seed: of the dataset; None takes those of the dataset
     in `out`, or the defaults where there is none. Where the sample is in a shard of `out`, its record says
-    what it is, redrawn or not; where there are shards and none of them has it, note(line) is called.
+    what it is, redrawn or not. note(line) is called where there are shards and none of them has it, and where
+    another version of FSID made it.
     FsidError: unusable key or settings, or others than those of the dataset.
     """
     out = Path(out)
     make_folder(out)
-    sample = _from_json(Path(key)) if key.endswith(".json") else _from_key(out, key, config, seed, note)
+    sample = _from_json(Path(key), note) if key.endswith(".json") else _from_key(out, key, config, seed, note)
     paths = []
     for extension, data in encode(sample).items():
         paths.append(out / f"{sample.key}.{extension}")
@@ -42,8 +44,8 @@ def make_only(
     return paths
 
 
-def _from_json(file: Path) -> Sample:
-    return _remake(read_record(read_whole(file), str(file)), str(file))
+def _from_json(file: Path, note: Callable[[str], None]) -> Sample:
+    return _remake(read_record(read_whole(file), str(file)), str(file), note)
 
 
 def _from_key(
@@ -74,7 +76,7 @@ def _from_key(
             settings = found.get("settings")
             if config.images and isinstance(settings, dict):
                 found = found | {"settings": settings | {"images": config.images}}
-            return _remake(found, f"{shard}: sample {index}")
+            return _remake(found, f"{shard}: sample {index}", note)
         if any(out.glob("shard-*.tar")):
             note(f"no shard of {out} has sample {sample_key(index)} yet; this is what it would be")
     config, seed = config or GenerateConfig(), seed or 0
@@ -83,7 +85,10 @@ def _from_key(
         return make_sample(config, seed, index, renderer)
 
 
-def _remake(record: dict[str, Any], where: str) -> Sample:
+def _remake(record: dict[str, Any], where: str, note: Callable[[str], None]) -> Sample:
+    version = record.get("fsid_version", __version__)
+    if version != __version__:
+        note(f"{where} was made by fsid {version!s:.40}, this is {__version__}: its files may be others")
     config = from_plain(GenerateConfig, record.get("settings"), source=f"{where}: settings")
     with rendering(config) as renderer:
         try:
