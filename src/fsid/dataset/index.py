@@ -69,7 +69,7 @@ class StoredMosaic:
         """All bytes of the file, mapped. FsidError where it is not the one that was indexed: in a shard that
         was written again pixels lie elsewhere."""
         mapped = np.memmap(self.shard, np.uint8, mode="r").view(np.ndarray)
-        if stamp(self.shard) != self.stamp:
+        if _stamp(self.shard) != self.stamp:
             raise FsidError(f"{self.shard}: has changed since it was indexed; run the same command again")
         return mapped
 
@@ -224,10 +224,15 @@ def _stated_origin(record: Mapping[str, Any]) -> tuple[str, str]:
 
 
 def _index_shard(shard: Path, suffix: str) -> list[StoredMosaic]:
-    stamped = stamp(shard)
+    stamped = _stamp(shard)
     with open_shard(shard) as (_, plain):
         members = [member for member in plain if member.name.endswith(suffix)]
     return [replace(_read_header(shard, m, m.name.removesuffix(suffix)), stamp=stamped) for m in members]
+
+
+def _stamp(shard: Path) -> tuple[int, ...]:
+    """Device, number, size and time of the file. Without its time of change, which a backup's link moves."""
+    return stamp(shard)[:4]
 
 
 def _read_header(shard: Path, member: tarfile.TarInfo, key: str) -> StoredMosaic:
