@@ -42,8 +42,9 @@ from fsid.denoise import (  # noqa: E402
     train,
 )
 from fsid.denoise.checkpoint import TrainState, load_checkpoint  # noqa: E402
-from fsid.denoise.denoise import variance_at_grey  # noqa: E402
+from fsid.denoise.denoise import most_noise, variance_at_grey  # noqa: E402
 from fsid.denoise.raw_denoiser import RawDenoiser  # noqa: E402
+from fsid.denoise.run_output import card_of  # noqa: E402
 from fsid.denoise.stabilise import stabilise, unstabilise  # noqa: E402
 from fsid.denoise.tensorboard_log import TensorBoardLog  # noqa: E402
 from fsid.denoise.train import _prepare, _step, learning_rate, mean_psnr, noise_left  # noqa: E402
@@ -669,6 +670,14 @@ def test_fine_tuning_starts_from_a_network_and_says_so(data: Path, tmp_path: Pat
     card = load_denoiser(tmp_path / "run").card
     assert card.training == f"4 images of {data.name} after 4 images of {data.name}"
     assert card.details["initial"]["details"]["config"]["seed"] == 3
+
+
+def test_a_network_that_is_trained_on_knows_no_less_noise_than_before(data: Path) -> None:
+    """The card of the one that ships does not say how much that is (0)."""
+    shipped = load_denoiser("nafnet-small")
+    assert shipped.card.most_noise == 0
+    card = card_of(data, replace(CONFIG, iso_max=800), 4, shipped)
+    assert most_noise(card) >= most_noise(shipped.card)
 
 
 def test_a_run_keeps_what_it_started_from(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from fsid.config import to_plain
 from fsid.dataset.config import DATASET_FILE
 from fsid.dataset.index import StoredMosaic, dataset_digest, index_mosaics
 from fsid.denoise.checkpoint import TrainState, save_checkpoint
-from fsid.denoise.denoise import variance_at_grey
+from fsid.denoise.denoise import most_noise, variance_at_grey
 from fsid.denoise.model import MODEL_FILE, Denoiser, ModelCard, save_model
 from fsid.denoise.progress_line import ProgressLine
 from fsid.denoise.sessions import Session, read_sessions
@@ -130,12 +130,12 @@ def card_of(data_dir: Path, config: TrainConfig, images: int, initial: Denoiser 
     details = {"config": to_plain(config), "data": _settings_of(data_dir)}
     cameras = [load_bayer_profile(name) for name in config.profiles]
     lowest = max(-camera.black_level / camera.span for camera in cameras)
-    most_noise = max(variance_at_grey(camera.level(config.iso_max)) for camera in cameras)
+    strongest = max(variance_at_grey(camera.level(config.iso_max)) for camera in cameras)
     if initial is not None:
         training += f" after {initial.card.training}"
-        most_noise = max(most_noise, initial.card.most_noise)
+        strongest = max(strongest, most_noise(initial.card))
         details["initial"] = to_plain(initial.card)
-    return ModelCard(config.network, config.patch_px, training, details, lowest, most_noise)
+    return ModelCard(config.network, config.patch_px, training, details, lowest, strongest)
 
 
 def _settings_of(data_dir: Path) -> dict[str, object]:
