@@ -139,6 +139,8 @@ def noise_of(raw: Raw, profile: str | None, iso: float | None, path: Path) -> No
     if stated is not None:
         return Noise(stated, "the file's NoiseProfile")
     lack = "holds no NoiseProfile" if raw.noise is None else "its NoiseProfile states no noise at all"
+    if raw.metadata.noise_removed >= 1:
+        lack = "was denoised before, as NoiseReductionApplied says"
     try:
         level = estimate_noise(raw).level
     except FsidError as error:
