@@ -20,6 +20,7 @@ from fsid.sensor.raw import NoiseLevel, Raw
 
 _NEAR = 0.9
 _SIGNIFICANT = 5.0  # standard errors
+_BRIGHT = 0.5  # x above which many pixels of one value are saturated, and not a light without noise
 _LEAST_SHARE = 1e-3  # of the pixels; fewer do not pay for a second pass
 _REACH = 4.5  # sigmas above `lowest`, from which on no noise is cut off
 _U = np.linspace(-1.0, _REACH, 1101)  # light is never below black, and a first result by little
@@ -36,17 +37,35 @@ def lowest_levels(raw: Raw, known: float) -> tuple[float | None, ...]:
     known: the x down to which the network has seen noise; what is cut off near there is nothing new to it.
     All None where few pixels are cut off.
     """
-    dn, found, count = 1 / (raw.white_level - raw.black_level), [], 0
+    dn, found, count = _dn(raw), [], 0
     for r, c in site_offsets(raw.cfa):
         site = raw.mosaic[r::2, c::2]
         least = float(site.min())
-        limit = least + dn / 2
-        at_least, up_to_next = (int(np.count_nonzero(site <= x)) for x in (limit, limit + dn))
-        more = at_least - (up_to_next - at_least)
-        is_cut = _NEAR * known < least < dn / 2 and more > _SIGNIFICANT * up_to_next**0.5
-        found.append(limit if is_cut else None)
-        count += at_least if is_cut else 0
+        at_least = _heaped(site - least, dn) if _NEAR * known < least < dn / 2 else 0
+        found.append(least + dn / 2 if at_least else None)
+        count += at_least
     return tuple(found) if count >= _LEAST_SHARE * raw.mosaic.size else (None,) * 4
+
+
+def highest_levels(raw: Raw) -> tuple[float, ...]:
+    """Of each site R, Gr, Gb, B the x that nothing in it exceeds: where it saturates, which many sensors do
+    below the white level, so that clearly more pixels have the greatest value than the DN before it. Else the
+    white level or the brightest pixel of all sites."""
+    brightest = max(1.0, float(raw.mosaic.max()))
+    greatest = [
+        (site, float(site.max())) for site in (raw.mosaic[r::2, c::2] for r, c in site_offsets(raw.cfa))
+    ]
+    return tuple(x if x > _BRIGHT and _heaped(x - site, _dn(raw)) else brightest for site, x in greatest)
+
+
+def _dn(raw: Raw) -> float:
+    return 1 / (raw.white_level - raw.black_level)
+
+
+def _heaped(distance: np.ndarray, dn: float) -> int:
+    """How many pixels lie at distance 0, where these are clearly more than those one DN on; else 0."""
+    here, up_to_next = (int(np.count_nonzero(distance <= x)) for x in (dn / 2, 1.5 * dn))
+    return here if 2 * here - up_to_next > _SIGNIFICANT * up_to_next**0.5 else 0
 
 
 def drawn_anew(

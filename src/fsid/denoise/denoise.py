@@ -24,7 +24,7 @@ from typing import Protocol
 
 import numpy as np
 
-from fsid.denoise.clipped_noise import drawn_anew, lowest_levels
+from fsid.denoise.clipped_noise import drawn_anew, highest_levels, lowest_levels
 from fsid.denoise.ensemble import check_ensemble, self_ensemble
 from fsid.denoise.model import ModelCard
 from fsid.errors import FsidError, whole
@@ -73,7 +73,8 @@ def denoise_raw(
 ) -> Raw:
     """The clean estimate of `raw`. Its `noise` is None (what is left no longer follows the law), its metadata
     are those of `raw` and state that it is denoised. Nothing is brighter than saturation or the brightest
-    pixel of `raw`: saturated light has no noise, which no training shows, and networks brighten it.
+    pixel of `raw`, nor than where its site saturates below the white level (`highest_levels`): saturated
+    light has no noise, which no training shows, and networks brighten it, each colour by its own.
 
     level: noise of `raw`; None takes `raw.noise`. strength: 0..1 is the share of the noise's amplitude that
     is removed, so that grain is left below 1; above 1 the noise is taken to be that many times as strong, up
@@ -113,7 +114,8 @@ def denoise_raw(
     if first:
         mosaic = drawn_anew(raw, denoised(mosaic, raw.cfa, level, -1), stated, lowest, known)
     mosaic = self_ensemble(mosaic, raw.cfa, level, ensemble, denoised)
-    np.minimum(mosaic, max(1.0, float(raw.mosaic.max())), out=mosaic)
+    for (r, c), limit in zip(site_offsets(raw.cfa), highest_levels(raw), strict=True):
+        np.minimum(mosaic[r::2, c::2], limit, out=mosaic[r::2, c::2])
     if strength < 1:
         mosaic *= np.float32(strength)
         mosaic += np.float32(1 - strength) * raw.mosaic

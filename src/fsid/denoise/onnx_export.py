@@ -41,8 +41,10 @@ Inputs: noisy (1, 4, H, W), the planes. k, sigma2 (1, 4): the noise variance of 
 units of x, as in the DNG tag NoiseProfile (where it has three pairs, both greens take the second). averages,
 frozen: leave them out, or see Large images.
 After: clean (1, 4, H, W) in units of x. Unpack it in the same way and cut off what was mirrored. Set what is
-above both 1 and the brightest x of the whole mosaic to the larger of these two: of saturated light, which has
-no noise, the graph makes some percent more. What is below 0 stays. DN = black + x (white - black).
+above the limit of its plane to that limit: of saturated light, which has no noise, the graph makes some
+percent more. The limit is the brightest x of the plane, where that is above 0.5 and n - m > 5 sqrt(n + m), n
+pixels having its DN and m the one before; else the larger of 1 and the brightest x of the whole mosaic. What
+is below 0 stays. DN = black + x (white - black).
 Large images, where H or W is above 2 `patch_px`: first run patches, `patch_px` high and wide in a plane, in
 max(1, round(4 sqrt(H / W))) rows and max(1, round(4 sqrt(W / H))) columns. Number i of n along a side starts
 at round((side - patch_px) (i + 1/2) / n), halves to the even number, or at 0 where the side is shorter. Give
