@@ -113,6 +113,14 @@ def test_an_iso_that_its_tag_does_not_hold_is_written_where_others_read_it(tmp_p
     assert read_header(path).iso == round(iso)
 
 
+def test_the_zone_of_each_date_is_kept(tmp_path):
+    """OffsetTime, -Original and -Digitized beside the dates they belong to."""
+    zones = tuple(Tag(code, ASCII, b"+02:00\0") for code in (36880, 36881, 36882))
+    write_dng(tmp_path / "a.dng", replace(_raw("RGGB"), metadata=Metadata(exif=zones)))
+    kept = {tag.code: tag.values for tag in read_raw(tmp_path / "a.dng").metadata.exif}
+    assert {code: kept.get(code) for code in (36880, 36881, 36882)} == {z.code: z.values for z in zones}
+
+
 @pytest.mark.parametrize("cfa", CFA_PATTERNS)
 @pytest.mark.parametrize("preview", [None, PREVIEW], ids=["bare", "preview"])
 def test_libraw_sees_the_same_picture(tmp_path, cfa, preview):
