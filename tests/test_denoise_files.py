@@ -25,6 +25,7 @@ import fsid  # noqa: E402
 from fsid.cli.main import main  # noqa: E402
 from fsid.denoise import ModelCard, NetworkConfig, RawDenoiser, denoise_raw, load_model, save_model  # noqa: E402
 from fsid.denoise import model as model_module  # noqa: E402
+from fsid.denoise.clipped_noise import highest_levels  # noqa: E402
 from fsid.denoise.denoise import variance_at_grey  # noqa: E402
 from fsid.denoise.export import export  # noqa: E402
 from fsid.denoise.files import denoise_file, denoise_folder, noise_of  # noqa: E402
@@ -38,6 +39,7 @@ from fsid.sensor import (  # noqa: E402
     NoiseLevel,
     Raw,
     develop,
+    estimate_noise,
     load_profile,
     noisy_from_clean,
     read_raw,
@@ -201,6 +203,20 @@ def test_saturated_light_stays_at_the_white_level(strength: float) -> None:
     assert denoise_raw(noisy, load_model("nafnet-small")).mosaic.max() > 1
 
 
+def test_light_stays_where_the_sensor_saturates_below_the_white_level() -> None:
+    """The network alone makes 0.99 of 0.96, each colour its own. What merely is brightest is no limit."""
+    light = np.full((64, 96), 0.3, np.float32)
+    light[:, 48:] = 2.5
+    clean = Raw(light, PROFILE.cfa, 64, 1023, (2, 1, 1.6), PROFILE.xyz_to_camera[0])
+    noisy = noisy_from_clean(np.random.default_rng(0), clean, 1600, PROFILE.level(1600))
+    noisy = replace(noisy, mosaic=noisy.mosaic.clip(max=np.float32(round(0.96 * 959) / 959)))
+    blown = pack(denoise_raw(noisy, load_model("nafnet-small")).mosaic, PROFILE.cfa)[:, :, 32:]
+    np.testing.assert_allclose(blown.mean((1, 2), dtype=float), noisy.mosaic.max(), rtol=1e-3)
+    assert highest_levels(noisy) == (noisy.mosaic.max(),) * 4
+    assert highest_levels(replace(noisy, mosaic=noisy.mosaic[:, :40])) == (1.0,) * 4
+    assert highest_levels(replace(noisy, mosaic=np.full((64, 96), 0.3, np.float32))) == (1.0,) * 4
+
+
 @pytest.mark.parametrize("strength", [8, 20, 100])
 def test_the_strongest_smoothing_keeps_the_colours(strength: float) -> None:
     rng = np.random.default_rng(0)
@@ -335,6 +351,17 @@ def test_noise_that_the_image_contradicts_is_said(
     assert "times the noise variance of profile galaxy-s22 at ISO 100" in capsys.readouterr().err
 
 
+def test_a_dark_picture_is_denoised_as_well_with_the_noise_that_it_shows() -> None:
+    """Light of less than the noise: a k that was found as 0.1 of itself cost up to 8 dB; 2.5 times itself, 5 dB."""
+    rng, camera = np.random.default_rng(0), load_profile("pixel6")
+    light = 0.006 * np.kron(rng.random((6, 6)), np.tile([[0.6, 1.0], [1.0, 0.4]], (32, 32)))
+    clean = Raw(light.astype(np.float32), camera.cfa, 64, 1023, (2, 1, 1.6), PROFILE.xyz_to_camera[0])
+    noisy = noisy_from_clean(rng, clean, 6400, camera.level(6400))
+    model, levels = load_model("nafnet-small"), (noisy.noise, estimate_noise(noisy).level)
+    errors = [np.mean((denoise_raw(noisy, model, level).mosaic - light) ** 2) for level in levels]
+    assert abs(10 * np.log10(errors[1] / errors[0])) < 0.5
+
+
 def test_a_denoised_file_says_so_and_is_not_smoothed_again_without_a_word(
     tmp_path: Path, noisy_file: Path, network: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -353,6 +380,16 @@ def test_a_denoised_file_says_so_and_is_not_smoothed_again_without_a_word(
             (mosaic,) = dng.pages[0].pages
             assert mosaic.tags[50935].value == {0.5: (1, 2), 1.0: (1, 1)}[stated]
     assert read_raw(noisy_file).metadata.noise_removed == 0
+
+
+def test_a_denoised_file_without_stated_noise_says_why_it_shows_none(
+    tmp_path: Path, noisy_file: Path, refused: Callable[..., str]
+) -> None:
+    once = tmp_path / "once.dng"
+    main(["denoise", str(noisy_file), str(once), "--quiet"])
+    said = refused("denoise", once, tmp_path / "twice.dng")
+    assert "once.dng: was denoised before, as NoiseReductionApplied says" in said
+    assert "give --profile" in said
 
 
 def test_a_noise_profile_of_zeros_is_none(

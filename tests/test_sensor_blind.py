@@ -16,7 +16,7 @@ from fsid.sensor import (
     load_profile,
     noisy_from_clean,
 )
-from fsid.sensor.blind import _HIGH, _Blocks, _line, _Pools, _pools, contradiction
+from fsid.sensor.blind import _HIGH, _Blocks, _fitted, _Lines, _Pools, _pools, contradiction
 
 PROFILE = load_profile("pixel6")
 
@@ -35,11 +35,23 @@ def ramp(height: int = 256, width: int = 256) -> np.ndarray:
     return np.tile(np.linspace(0.0, 0.8, width), (height, 1))
 
 
+def lines(k: float, sigma2: float) -> _Lines:
+    line = np.array([k, sigma2])
+    return _Lines(line, np.tile(line, (4, 1)), np.zeros((4, 2, 0)))
+
+
+def fitted(mean: np.ndarray, variance: np.ndarray, freedom: float, floor: float) -> np.ndarray:
+    """(k, sigma2) of pools that are alike for all sites."""
+    parts, sites = (n.ravel() for n in np.indices((mean.size, 4)))
+    pools = _Pools(mean[parts], variance[parts], np.full(parts.size, freedom), sites, parts)
+    return _fitted(pools, lines(1e-3, 1e-5), floor).common
+
+
 def test_pools_that_texture_lifts_count_less_than_those_below():
     mean = np.linspace(0.02, 0.8, 24)
     variance = 1e-3 * mean + 1e-5
     variance[[5, 11, 12, 20]] *= 1.5
-    line, _ = _line(_Pools(mean, variance, np.full(24, 2000.0)), 1e-8)
+    line = fitted(mean, variance, 500, 1e-8)
     np.testing.assert_allclose(line @ (mean, np.ones(24)), 1e-3 * mean + 1e-5, rtol=0.02)
 
 
@@ -140,26 +152,68 @@ def test_an_image_without_noise_is_refused(mosaic, words):
 def test_the_noise_of_rounding_is_counted_once():
     """Pools on a line give that line, though sigma2 is fitted as what it has beyond the floor."""
     mean, floor = np.linspace(0, 0.8, 12), 1e-6
-    pools = _Pools(mean, 2e-5 * mean + 3 * floor, np.full(12, 1e4))
-    np.testing.assert_allclose(_line(pools, floor)[0], (2e-5, 3 * floor), rtol=1e-9)
+    found = fitted(mean, 2e-5 * mean + 3 * floor, 1e4, floor)
+    np.testing.assert_allclose(found, (2e-5, 3 * floor), rtol=1e-9)
 
 
 def test_pools_scatter_by_the_degrees_of_freedom_that_they_state(rng):
     """Var(variance) = 2 variance^2 / freedom, for the median of the blocks as well."""
     high = np.square(rng.standard_normal((30, 4800, int(_HIGH.sum())))).mean(axis=2)
+    zero, site = np.zeros(4800), np.zeros(4800, int)
     pools = [
-        _pools(_Blocks(99 * rng.random(4800), np.zeros(4800), of, 1.0), np.array([0.0, 1.0])) for of in high
+        _pools(_Blocks(99 * rng.random(4800), zero, of, zero, site, 1.0), lines(0.0, 1.0)) for of in high
     ]
     z2 = [(pool.variance - 1) ** 2 * pool.freedom / 2 for pool in pools]
     assert np.mean(z2) == pytest.approx(1, abs=0.15)
 
 
+@pytest.mark.parametrize("brightest", [0.002, 0.004, 0.01])
+def test_the_noise_of_the_dark_is_found_within_its_error(brightest, rng):
+    """Light of 0.1 to 0.5 sigma. Blocks that were sorted by their own noise gave k as 0.05 to 0.5 of itself,
+    by up to six stated errors, and shadows that were 10 to 40 % too bright when it was removed."""
+    level = NoiseLevel((4.7e-3,) * 4, (6e-5,) * 4)
+    squares = np.kron(rng.uniform(0, brightest, (16, 16)), np.ones((64, 64)))
+    found = estimate_noise(noisy_from_clean(rng, scene(squares), 6400, level))
+    assert np.all(np.abs(np.array(found.level.k) - level.k) < 4 * np.array(found.k_error))
+    np.testing.assert_allclose(found.level.sigma2, level.sigma2, rtol=0.07)
+    assert 0.7 < np.mean(found.level.k) / level.k[0] < 1.1
+
+
+def test_k_of_sites_that_differ_is_found_in_the_dark(rng):
+    """Red and blue are darker than green and have twice its sigma2: together they show k as 0.4 of itself."""
+    level = NoiseLevel((4.7e-3,) * 4, (1.1e-4, 5.5e-5, 5.5e-5, 1e-4))
+    squares = np.kron(rng.uniform(0, 0.02, (16, 16)), np.tile([[0.6, 1.0], [1.0, 0.4]], (32, 32)))
+    found = estimate_noise(noisy_from_clean(rng, scene(squares), 6400, level)).level
+    np.testing.assert_allclose(found.k, level.k, rtol=0.2)
+    np.testing.assert_allclose(found.sigma2, level.sigma2, rtol=0.1)
+
+
+@pytest.mark.parametrize("black_level", [0, 64])
+def test_k_that_light_does_not_tell_is_that_of_a_usual_camera(black_level, rng):
+    """Under a lens cap: read noise of 2 electrons, with an error as large as k."""
+    level = NoiseLevel((0.0,) * 4, (6e-5,) * 4)
+    dark = replace(scene(np.zeros((512, 512))), black_level=black_level)
+    found = estimate_noise(noisy_from_clean(rng, dark, 6400, level))
+    np.testing.assert_allclose(found.level.k, (6e-5 / 4) ** 0.5, rtol=0.3)
+    np.testing.assert_allclose(found.k_error, found.level.k, rtol=0.3)
+
+
+def test_k_that_light_tells_is_not_that_of_a_usual_camera(rng):
+    """Read noise of 0.2 and of 20 electrons."""
+    for read in (0.2, 20):
+        level = NoiseLevel((2e-3,) * 4, ((2e-3 * read) ** 2,) * 4)
+        found = estimate_noise(noisy_from_clean(rng, scene(ramp(512, 512)), 800, level))
+        np.testing.assert_allclose(found.level.k, level.k, rtol=0.06)
+
+
 def test_a_site_that_shows_nothing_has_the_errors_of_texture_and_of_other_sites(rng):
-    """Its red is saturated: 8 % that texture makes, and the 10 and 30 % by which sites differ."""
+    """Its red is saturated: 8 % that texture makes, and the 10 % by which it and the other three differ."""
     noisy = noisy_from_clean(rng, scene(ramp(1024, 1024)), 800, NoiseLevel((2e-3,) * 4, (4e-5,) * 4))
     noisy.mosaic[::2, ::2] = 1
     found = estimate_noise(noisy)
-    assert found.k_error[0] / found.level.k[0] == pytest.approx(np.hypot(0.08, 0.1), rel=0.05)
+    assert found.k_error[0] / found.level.k[0] == pytest.approx(
+        np.hypot(0.08, 0.1 * (1 + 1 / 3) ** 0.5), rel=0.05
+    )
 
 
 @pytest.mark.parametrize(

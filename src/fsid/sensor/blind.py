@@ -6,15 +6,22 @@
 The coefficients of white noise are independent of each other, so choosing blocks by their low frequencies
 leaves the noise in their high ones as it was (Ponomarenko et al. 2007; Colom, Buades & Morel 2014 for RAW). A
 block is smooth where its low frequencies hold no more energy than its noise alone would half of the time; the
-noise is known better after each round. Blocks of like mean are pooled by their median, and pools above the
-line count less than those below it: texture that was missed only ever adds.
+noise is known better after each round. Blocks of like mean are pooled by their median, and parts of the range
+above the line count less than those below it: texture that was missed only ever adds.
+
+In the dark a mean says more of its own noise than of light, and blocks sorted by it show too flat a line
+(regression dilution: k 0.05 to 0.5 of itself). So one more coefficient b is taken, whose noise is independent
+of that of the mean and of the same size: blocks are sorted by mean + b, and their light is mean - b, which
+knows nothing of the noise that sorted them.
 
 Where noise reaches DN 0 it is cut off there, and all of it where black is stored as 0: mean and variance of a
 pool are then taken back to those before (`stored_noise`), and it counts less the more was cut off.
 
-A picture rarely shows every colour in every light, so a site that says little is drawn to the mean of all
-four, from which the sites of published phones differ by `SITE_SPREAD`. Where hardly any block is smooth, the
-smoothest are taken. Texture as fine and random as noise (grain, gravel, grass) cannot be told from it.
+A picture rarely shows every colour in every light, so the lines of the four sites are fitted together, and a
+site that says little is drawn to the mean of all, from which the sites of published phones differ by
+`SITE_SPREAD`. Where light is too much alike to tell k, it is that of a camera whose read noise is usual
+(`_READ_E2`). Where hardly any block is smooth, the smoothest are taken. Texture as fine and random as noise
+(grain, gravel, grass) cannot be told from it.
 """
 
 from __future__ import annotations
@@ -24,7 +31,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.fft import dctn
-from scipy.optimize import nnls
+from scipy.optimize import lsq_linear, nnls
 from scipy.special import gammaincinv
 
 from fsid.errors import FsidError
@@ -40,7 +47,8 @@ _SIDE = 8
 _MAX_BLOCKS = 40_000  # of one site
 _POOLS = 24
 _MIN_POOL = 20  # blocks
-_PART_WIDTH = 1.0  # sigmas of a pixel, which are 8 of the mean of a block
+_MIN_GROUP = 5  # blocks of a site in a pool, below which their median says nothing
+_PART_WIDTH = 0.25  # sigmas of a pixel, which are 2 of the mean of a block
 _MIN_BLOCKS = 64  # of all sites
 _MIN_SMOOTH = 400  # blocks; a picture with fewer lets in rougher ones, up to `_ROUGHEST`
 _ROUGHEST = 4.0  # energy of low frequencies over that of noise
@@ -48,6 +56,8 @@ _FIRST_SHARE = 0.05  # of the blocks, the smoothest ones, from which the first l
 _ROUNDS = 8
 _SMOOTH_QUANTILE = 0.5
 _REWEIGHTINGS = 12
+_READ_E2 = 4.0  # read noise, electrons squared: sigma2 / k^2, 1.6 to 13 over the built-in profiles at ISO 800
+_LEAST_K = 1e-15  # keeps what is a share of k above 0
 _TEXTURE = 0.08  # of a variance: error that texture makes in an ordinary photograph (bench/blind_noise.py)
 
 
@@ -78,51 +88,70 @@ def stated_noise(raw: Raw) -> NoiseLevel | None:
 def contradiction(raw: Raw, level: NoiseLevel) -> float | None:
     """Variance that `raw` shows over that of `level`, both in the mean light of the image, where it is above
     `UNLIKE` or below its inverse by two standard errors; None where it is not, or the image does not tell."""
-    light = [float(raw.mosaic[r::2, c::2].clip(0, 1).mean()) for r, c in site_offsets(raw.cfa)]
+    light = np.array([raw.mosaic[r::2, c::2].clip(0, 1).mean() for r, c in site_offsets(raw.cfa)])
     floor = ROUNDING_DN2 / (raw.white_level - raw.black_level) ** 2
-    stated = max(_in_light(level.k, level.sigma2, light), floor)
+    stated = max(float(np.mean(level.k * light + level.sigma2)), floor)
     try:
-        shown = estimate_noise(raw)
+        _, lines, _ = _measured(raw)
     except NoiselessError:
         return 0.0 if stated > UNLIKE * floor else None
     except FsidError:
         return None
-    times = _in_light(shown.level.k, shown.level.sigma2, light) / stated
-    error = _in_light(shown.k_error, shown.sigma2_error, light) / stated
+    variance = lines.sites[:, 0] * light + lines.sites[:, 1]
+    # Where k comes out too large, sigma2 comes out too small: together they are off by less than this.
+    fit = np.hypot(lines.errors[:, 0] * light, lines.errors[:, 1])
+    times, error = variance.mean() / stated, np.hypot(fit.mean(), _TEXTURE * variance.mean()) / stated
     return times if times - 2 * error > UNLIKE or times + 2 * error < 1 / UNLIKE else None
-
-
-def _in_light(k: Sequence[float], sigma2: Sequence[float], light: Sequence[float]) -> float:
-    """Mean over the sites of k x + sigma2; of errors it is the most that they can be."""
-    return sum(a * x + b for a, b, x in zip(k, sigma2, light, strict=True)) / 4
 
 
 @dataclass(frozen=True, eq=False)
 class _Blocks:
-    """Blocks of one site: mean, energy of low frequencies and of high ones, each per coefficient.
+    """Blocks: mean, energy of low frequencies and of high ones, each per coefficient, and CFA site (0..3).
 
-    share: of a block that no other block holds too; blocks overlap where there are few. lowest: x of DN 0,
-    where noise is cut off; -infinity where it does not reach it.
+    aside: one number more, of noise that is independent of that of the others and as large as that of the
+    mean. share: of a block that no other block holds too; blocks overlap where there are few. lowest: x of
+    DN 0, where noise is cut off; -infinity where it does not reach it.
     """
 
     mean: np.ndarray
     low: np.ndarray
     high: np.ndarray
+    aside: np.ndarray
+    site: np.ndarray
     share: float
     lowest: float = -np.inf
 
 
 @dataclass(frozen=True, eq=False)
 class _Pools:
-    """Medians of smooth blocks: mean, variance, and how many independent coefficients stand behind each."""
+    """Medians of smooth blocks of one site in one part of the range: mean, variance, and how many independent
+    coefficients stand behind each."""
 
     mean: np.ndarray
     variance: np.ndarray
     freedom: np.ndarray
+    site: np.ndarray
+    part: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class _Lines:
+    """k and sigma2: common (2,), from which those of the sites (4, 2) differ; spread (4, 2, n): what
+    each of n independent deviations of one standard error adds to the latter."""
+
+    common: np.ndarray
+    sites: np.ndarray
+    spread: np.ndarray
+
+    @property
+    def errors(self) -> np.ndarray:
+        """(4, 2) standard errors of the sites."""
+        return np.asarray(np.linalg.norm(self.spread, axis=2))
 
 
 _ORDER = np.add.outer(np.arange(_SIDE), np.arange(_SIDE))
 _LOW, _HIGH = (_ORDER > 0) & (_ORDER < _SIDE), _ORDER >= _SIDE + 2
+_ASIDE = (_ORDER >= _SIDE) & (_ORDER < _SIDE + 2)
 _LOW_LIMIT = 2 * gammaincinv(_LOW.sum() / 2, _SMOOTH_QUANTILE) / _LOW.sum()  # chi2 quantiles per degree of
 _HIGH_MEDIAN = 2 * gammaincinv(_HIGH.sum() / 2, 0.5) / _HIGH.sum()  # freedom; scipy.stats is slow to import
 _NEAR_0 = 0.75  # of the way from black to DN 0, beyond which the least value is taken for DN 0
@@ -139,36 +168,47 @@ def estimate_noise(raw: Raw) -> NoiseEstimate:
     sigma2 is never below the rounding noise of the camera's integers. Fixed pattern noise counts as noise.
     FsidError: an image without smooth parts, saturated or without noise: nothing to measure.
     """
-    span = raw.white_level - raw.black_level
-    near_0 = (1 - _NEAR_0 * raw.black_level) / span
-    blocks = [_blocks(raw.mosaic[r::2, c::2], near_0) for r, c in site_offsets(raw.cfa)]
-    floor = ROUNDING_DN2 / span**2
-    mean, low, high = (np.concatenate([getattr(b, n) for b in blocks]) for n in ("mean", "low", "high"))
-    together = _Blocks(mean, low, high, blocks[0].share, max(b.lowest for b in blocks))
-    if together.mean.size < _MIN_BLOCKS:
-        raise FsidError(
-            "the image is too small, or saturated or at DN 0 almost everywhere, to tell its noise"
-        )
-    line = _first_line(together, floor)
-    for _ in range(_ROUNDS):
-        pools = _pools(together, line)
-        line, errors = _line(pools, floor)
-    if line[0] == 0 and line[1] <= floor:
-        raise NoiselessError("the image holds no noise beyond its rounding; there is nothing to measure")
-    if np.all(errors > line):
-        raise FsidError("the image does not tell its noise: too few smooth parts, or all of one brightness")
-    errors = np.hypot(
-        errors, _TEXTURE * np.array([line[0], line[0] * pools.mean.clip(min=0).min() + line[1]])
-    )
-    sites = [_site_line(_pools(site, line), line, errors, floor) for site in blocks]
+    pools, lines, floor = _measured(raw)
+    sites = [_physical(pools, number, lines, floor) for number in range(4)]
     (k, sigma2), (k_error, sigma2_error) = np.transpose(sites, (1, 2, 0))
     return NoiseEstimate(NoiseLevel(four(k), four(sigma2)), four(k_error), four(sigma2_error))
 
 
-def _blocks(plane: np.ndarray, near_0: float) -> _Blocks:
+def _measured(raw: Raw) -> tuple[_Pools, _Lines, float]:
+    """The pools of `raw`, the lines through them, and the variance of its rounding. FsidError: as above."""
+    span = raw.white_level - raw.black_level
+    near_0 = (1 - _NEAR_0 * raw.black_level) / span
+    planes = [raw.mosaic[r::2, c::2] for r, c in site_offsets(raw.cfa)]
+    blocks = _together([_blocks(plane, number, near_0) for number, plane in enumerate(planes)])
+    floor = ROUNDING_DN2 / span**2
+    if blocks.mean.size < _MIN_BLOCKS:
+        raise FsidError(
+            "the image is too small, or saturated or at DN 0 almost everywhere, to tell its noise"
+        )
+    first = _first_line(blocks, floor)
+    lines = _Lines(first, np.tile(first, (4, 1)), np.zeros((4, 2, 0)))
+    for _ in range(_ROUNDS):
+        pools = _pools(blocks, lines)
+        lines = _fitted(pools, lines, floor)
+    if lines.common[0] == 0 and lines.common[1] <= floor:
+        raise NoiselessError("the image holds no noise beyond its rounding; there is nothing to measure")
+    light = np.array([np.average(pools.mean.clip(min=0), weights=pools.freedom.clip(min=1e-9)), 1.0])
+    if np.linalg.norm(light @ lines.spread.mean(axis=0)) > light @ lines.common:
+        raise FsidError("the image does not tell its noise: too few smooth parts")
+    return pools, lines, floor
+
+
+def _together(sites: Sequence[_Blocks]) -> _Blocks:
+    parts = ("mean", "low", "high", "aside", "site")
+    mean, low, high, aside, site = (np.concatenate([getattr(s, part) for s in sites]) for part in parts)
+    return _Blocks(mean, low, high, aside, site, sites[0].share, max(s.lowest for s in sites))
+
+
+def _blocks(plane: np.ndarray, site: int, near_0: float) -> _Blocks:
     """Blocks of `plane` (h, w) in an even grid, overlapping where there are few; without saturated ones.
 
-    near_0: x below which the least value is that of DN 0; where that lies, sites differ in a little.
+    site: whose plane it is. near_0: x below which the least value is that of DN 0; where that lies, sites
+    differ in a little.
     """
     height, width = plane.shape
     step = _SIDE
@@ -177,7 +217,7 @@ def _blocks(plane: np.ndarray, near_0: float) -> _Blocks:
     share = (step / _SIDE) ** 2
     if min(height, width) < _SIDE:
         none = np.empty(0, np.float32)
-        return _Blocks(none, none, none, share)
+        return _Blocks(none, none, none, none, np.empty(0, np.intp), share)
     tiles = np.lib.stride_tricks.sliding_window_view(plane, (_SIDE, _SIDE))[::step, ::step]
     tiles = tiles.reshape(-1, _SIDE, _SIDE)
     tiles = tiles[:: max(1, len(tiles) // _MAX_BLOCKS)]
@@ -185,9 +225,11 @@ def _blocks(plane: np.ndarray, near_0: float) -> _Blocks:
     least = float(plane.min())
     lowest = least if least < near_0 else -np.inf
     tiles = tiles[tiles.max(axis=(1, 2)) > lowest]  # what is all DN 0 shows no noise
-    energy = dctn(tiles, axes=(1, 2), norm="ortho") ** 2
+    waves = dctn(tiles, axes=(1, 2), norm="ortho")
+    aside = waves[:, _ASIDE].sum(axis=1) / (_SIDE * np.sqrt(_ASIDE.sum()))
+    energy = waves**2
     low, high = (energy[:, part].mean(axis=1) for part in (_LOW, _HIGH))
-    return _Blocks(tiles.mean(axis=(1, 2)), low, high, share, lowest)
+    return _Blocks(tiles.mean(axis=(1, 2)), low, high, aside, np.full(len(tiles), site), share, lowest)
 
 
 def _first_line(blocks: _Blocks, floor: float) -> np.ndarray:
@@ -204,17 +246,22 @@ def _first_line(blocks: _Blocks, floor: float) -> np.ndarray:
     return np.maximum(line, (0, floor))
 
 
-def _pools(blocks: _Blocks, line: np.ndarray) -> _Pools:
-    expected = line[0] * blocks.mean.clip(min=0) + line[1]
+def _pools(blocks: _Blocks, lines: _Lines) -> _Pools:
+    k, sigma2 = lines.sites[blocks.site].T
+    expected = k * blocks.mean.clip(min=0) + sigma2
     expected *= _left((blocks.mean - blocks.lowest) / np.sqrt(expected))
-    parts = _parts_of_like_mean(blocks.mean, blocks.low / expected, line)
-    mean = np.array([blocks.mean[part].mean() for part in parts])
-    variance = np.array(
-        [np.median(blocks.high[part] / expected[part]) * expected[part].mean() for part in parts]
-    )
-    freedom = np.array([part.size * blocks.share * _HIGH.sum() * _MEDIAN_EFFICIENCY for part in parts])
-    light, noise, clipped = before_clipping(mean, variance / _HIGH_MEDIAN, blocks.lowest, _NO_WHITE)
-    return _Pools(light, noise, freedom * (1 - clipped) ** _SEEN)
+    parts = _parts_of_like_mean(blocks.mean + blocks.aside, blocks.low / expected, lines.common)
+    light, ratio = blocks.mean - blocks.aside, blocks.high / expected
+    rows = [
+        (light[own].mean(), np.median(ratio[own]) * expected[own].mean(), own.size, site, number)
+        for number, part in enumerate(parts)
+        for site in range(4)
+        if (own := part[blocks.site[part] == site]).size >= _MIN_GROUP
+    ]
+    mean, variance, size, *where = np.array(rows, np.float64).reshape(-1, 5).T
+    freedom = size * blocks.share * _HIGH.sum() * _MEDIAN_EFFICIENCY
+    mean, variance, clipped = before_clipping(mean, variance / _HIGH_MEDIAN, blocks.lowest, _NO_WHITE)
+    return _Pools(mean, variance, freedom * (1 - clipped) ** _SEEN, *np.array(where, np.intp))
 
 
 def _parts_of_like_mean(mean: np.ndarray, roughness: np.ndarray, line: np.ndarray) -> list[np.ndarray]:
@@ -223,9 +270,9 @@ def _parts_of_like_mean(mean: np.ndarray, roughness: np.ndarray, line: np.ndarra
     mean, roughness: (n,), of blocks: normalised light, and energy of low frequencies over that of noise.
     line: (2,) k and sigma2, normalised.
     Every part of the range has its own pool: else the black of a picture that is full of it speaks for its
-    light too, in which it says nothing of k. No part is narrower than `_PART_WIDTH` sigmas of noise: blocks
-    of the same light would be sorted by their noise, and show k = 0. Where smooth blocks are of one light,
-    the least rough ones of every other count, too.
+    light too, in which it says nothing of k. No part is narrower than `_PART_WIDTH` sigmas of noise, which
+    would sort blocks by their noise alone. Where smooth blocks are of one light, the least rough ones of
+    every other count, too.
     """
     sigma = np.sqrt(line[0] * mean.clip(min=0) + line[1])
     sigmas = 2 * mean / (sigma + np.sqrt(line[1]))  # from black: integral of 1 / sigma
@@ -263,38 +310,58 @@ def _left(sigmas: np.ndarray) -> np.ndarray:
     return np.interp(sigmas, _SIGMAS + _SHIFT, _LEFT)
 
 
-def _line(pools: _Pools, floor: float) -> tuple[np.ndarray, np.ndarray]:
-    """(k, sigma2) and their standard errors; pools above the line, which texture lifts, count less."""
+def _fitted(pools: _Pools, before: _Lines, floor: float) -> _Lines:
+    """The lines through `pools`: V = (k + dk) x + sigma2 + dsigma2, dk and dsigma2 of a site being 0 within
+    `SITE_SPREAD` of those `before`. Parts of the range above the lines, which texture lifts, count less."""
     if pools.mean.size == 0:
         raise FsidError("the image has no smooth part in which its noise could be seen")
-    design = np.stack([pools.mean.clip(min=0), np.ones_like(pools.mean)], axis=1)
+    light = np.stack([pools.mean.clip(min=0), np.ones_like(pools.mean)], axis=1)
+    design = np.hstack([light, (np.eye(4)[pools.site][:, :, None] * light[:, None]).reshape(-1, 8)])
+    of_site = np.hstack([np.tile(np.eye(2), (4, 1)), np.eye(8)])
+    bounds = (np.array([0.0] * 2 + [-np.inf] * 8), np.full(10, np.inf))
+    spread = np.tile(np.array(SITE_SPREAD) * np.maximum(before.common, (_LEAST_K, floor)), 4)
+    prior = np.hstack([np.zeros((8, 2)), np.diag(1 / spread)])
     model = np.maximum(pools.variance, floor)
-    weight = np.ones_like(model)
+    root = np.sqrt(pools.freedom / 2) / model
     for _ in range(_REWEIGHTINGS):
-        root = np.sqrt(weight * pools.freedom / 2) / model
-        line, _ = nnls(design * root[:, None], (pools.variance - floor) * root)
-        line[1] += floor
-        model = design @ line
-        z = (pools.variance / model - 1) / np.sqrt(2 / pools.freedom)
-        weight = 1 / (1 + (z.clip(min=0) / 2) ** 2)
-    root = np.sqrt(weight * pools.freedom / 2) / model
+        rows = np.concatenate([design * root[:, None], prior])
+        unit = 1 / np.linalg.norm(rows, axis=0)  # of variables whose sizes are far apart
+        values = np.concatenate([(pools.variance - floor) * root, np.zeros(8)])
+        found = unit * lsq_linear(rows * unit, values, bounds, method="bvls").x
+        model = np.maximum(design @ found + floor, floor)
+        root = np.sqrt(_weight(pools, model) * pools.freedom / 2) / model
     scatter = max(1.0, float(np.sum((root * (pools.variance - model)) ** 2) / max(len(model) - 2, 1)))
-    normal = (design * root[:, None]).T @ (design * root[:, None])
-    return line, np.sqrt(np.diag(np.linalg.pinv(normal)) * scatter)
+    rows = np.concatenate([design * root[:, None] / np.sqrt(scatter), prior])
+    unit = 1 / np.linalg.norm(rows, axis=0)
+    spread = (of_site * unit) @ np.linalg.pinv(rows * unit)
+    zero = np.array([0.0, floor])
+    sites = np.maximum((of_site @ found).reshape(4, 2) + zero, zero)
+    return _Lines(found[:2] + zero, sites, spread.reshape(4, 2, -1))
 
 
-def _site_line(
-    pools: _Pools, line: np.ndarray, errors: np.ndarray, floor: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """(k, sigma2) of one site and their errors, its own pools weighed against the line of all sites."""
-    prior = np.hypot(errors, np.array(SITE_SPREAD) * line)
-    if pools.mean.size == 0:
-        return line, prior
-    design = np.stack([pools.mean.clip(min=0), np.ones_like(pools.mean)], axis=1)
-    model = design @ line
-    z = (pools.variance / model - 1) / np.sqrt(2 / pools.freedom)
-    root = np.sqrt(pools.freedom / 2 / (1 + (z.clip(min=0) / 2) ** 2)) / model
-    rows = np.concatenate([design * root[:, None], np.diag(1 / prior)])
-    values = np.concatenate([pools.variance * root, line / prior])
-    found, *_ = np.linalg.lstsq(rows, values, rcond=None)
-    return np.maximum(found, (0, floor)), np.sqrt(np.diag(np.linalg.inv(rows.T @ rows)))
+def _weight(pools: _Pools, model: np.ndarray) -> np.ndarray:
+    """(n,) of pools: by how far all pools in the same part of the range together lie above `model`."""
+    freedom = np.bincount(pools.part, pools.freedom).clip(min=1e-9)
+    above = np.bincount(pools.part, pools.freedom * (pools.variance / model - 1)) / freedom
+    z = above / np.sqrt(2 / freedom)
+    return (1 / (1 + (z.clip(min=0) / 2) ** 2))[pools.part]
+
+
+def _physical(pools: _Pools, site: int, lines: _Lines, floor: float) -> tuple[np.ndarray, np.ndarray]:
+    """(k, sigma2) of one site and their errors, with what texture may add at either end of the light seen.
+
+    k is weighed against that of a camera whose read noise is `_READ_E2` and that has the same variance in the
+    mean light of the site, where the image tells it; the square of that k is the variance of this guess.
+    """
+    x = pools.mean.clip(min=0)
+    own = pools.freedom * (pools.site == site)
+    light = float(np.average(x, weights=own if own.any() else np.ones_like(x)))
+    k, sigma2 = lines.sites[site]
+    dark, bright, variance = (k * at + sigma2 for at in (x.min(), x.max(), light))
+    texture = _TEXTURE * np.array([np.hypot(dark, bright) / max(x.max() - x.min(), 1e-9), dark])
+    k_error, sigma2_error = np.hypot(lines.errors[site], texture)
+    usual = (np.sqrt(light**2 + 4 * _READ_E2 * variance) - light) / (2 * _READ_E2)
+    told = usual**2 / (usual**2 + k_error**2)
+    k, k_error = told * k + (1 - told) * usual, np.sqrt(told) * k_error
+    sigma2_error = min(sigma2_error, np.hypot(_TEXTURE * variance, k_error * light))
+    return np.array([k, max(variance - k * light, floor)]), np.array([k_error, sigma2_error])
