@@ -352,7 +352,7 @@ def test_noise_that_the_image_contradicts_is_said(
 
 
 def test_a_dark_picture_is_denoised_as_well_with_the_noise_that_it_shows() -> None:
-    """Light of less than the noise: a k that was found as 0.1 of itself cost up to 8 dB; 2.5 times itself, 5 dB."""
+    """Light of less than the noise: a k of 2.5 times itself cost 5 dB, one of 0.1 of itself 8 dB."""
     rng, camera = np.random.default_rng(0), load_profile("pixel6")
     light = 0.006 * np.kron(rng.random((6, 6)), np.tile([[0.6, 1.0], [1.0, 0.4]], (32, 32)))
     clean = Raw(light.astype(np.float32), camera.cfa, 64, 1023, (2, 1, 1.6), PROFILE.xyz_to_camera[0])
