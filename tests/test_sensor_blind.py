@@ -16,7 +16,8 @@ from fsid.sensor import (
     load_profile,
     noisy_from_clean,
 )
-from fsid.sensor.blind import _HIGH, _Blocks, _fitted, _Lines, _Pools, _pools, contradiction
+from fsid.sensor.blind import _HIGH, _Blocks, _pools, contradiction
+from fsid.sensor.blind_lines import Lines, Pools, fitted
 
 PROFILE = load_profile("pixel6")
 
@@ -35,23 +36,23 @@ def ramp(height: int = 256, width: int = 256) -> np.ndarray:
     return np.tile(np.linspace(0.0, 0.8, width), (height, 1))
 
 
-def lines(k: float, sigma2: float) -> _Lines:
+def lines(k: float, sigma2: float) -> Lines:
     line = np.array([k, sigma2])
-    return _Lines(line, np.tile(line, (4, 1)), np.zeros((4, 2, 0)))
+    return Lines(line, np.tile(line, (4, 1)), np.zeros((4, 2, 0)))
 
 
-def fitted(mean: np.ndarray, variance: np.ndarray, freedom: float, floor: float) -> np.ndarray:
+def line_through(mean: np.ndarray, variance: np.ndarray, freedom: float, floor: float) -> np.ndarray:
     """(k, sigma2) of pools that are alike for all sites."""
     parts, sites = (n.ravel() for n in np.indices((mean.size, 4)))
-    pools = _Pools(mean[parts], variance[parts], np.full(parts.size, freedom), sites, parts)
-    return _fitted(pools, lines(1e-3, 1e-5), floor).common
+    pools = Pools(mean[parts], variance[parts], np.full(parts.size, freedom), sites, parts)
+    return fitted(pools, lines(1e-3, 1e-5), floor).common
 
 
 def test_pools_that_texture_lifts_count_less_than_those_below():
     mean = np.linspace(0.02, 0.8, 24)
     variance = 1e-3 * mean + 1e-5
     variance[[5, 11, 12, 20]] *= 1.5
-    line = fitted(mean, variance, 500, 1e-8)
+    line = line_through(mean, variance, 500, 1e-8)
     np.testing.assert_allclose(line @ (mean, np.ones(24)), 1e-3 * mean + 1e-5, rtol=0.02)
 
 
@@ -152,7 +153,7 @@ def test_an_image_without_noise_is_refused(mosaic, words):
 def test_the_noise_of_rounding_is_counted_once():
     """Pools on a line give that line, though sigma2 is fitted as what it has beyond the floor."""
     mean, floor = np.linspace(0, 0.8, 12), 1e-6
-    found = fitted(mean, 2e-5 * mean + 3 * floor, 1e4, floor)
+    found = line_through(mean, 2e-5 * mean + 3 * floor, 1e4, floor)
     np.testing.assert_allclose(found, (2e-5, 3 * floor), rtol=1e-9)
 
 

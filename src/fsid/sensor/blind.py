@@ -17,11 +17,8 @@ knows nothing of the noise that sorted them.
 Where noise reaches DN 0 it is cut off there, and all of it where black is stored as 0: mean and variance of a
 pool are then taken back to those before (`stored_noise`), and it counts less the more was cut off.
 
-A picture rarely shows every colour in every light, so the lines of the four sites are fitted together, and a
-site that says little is drawn to the mean of all, from which the sites of published phones differ by
-`SITE_SPREAD`. Where light is too much alike to tell k, it is that of a camera whose read noise is usual
-(`_READ_E2`). Where hardly any block is smooth, the smoothest are taken. Texture as fine and random as noise
-(grain, gravel, grass) cannot be told from it.
+The lines of the four sites are fitted together (`blind_lines`). Where hardly any block is smooth, the
+smoothest are taken. Texture as fine and random as noise (grain, gravel, grass) cannot be told from it.
 """
 
 from __future__ import annotations
@@ -31,17 +28,17 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.fft import dctn
-from scipy.optimize import lsq_linear, nnls
+from scipy.optimize import nnls
 from scipy.special import gammaincinv
 
 from fsid.errors import FsidError
+from fsid.sensor.blind_lines import TEXTURE, Lines, Pools, fitted, physical
 from fsid.sensor.mosaic import site_offsets
 from fsid.sensor.quantise import ROUNDING_DN2
 from fsid.sensor.raw import NoiseLevel, Raw, four
 from fsid.sensor.stored_noise import before_clipping, censored
 
 UNLIKE = 4.0  # times a variance: two stops of ISO, beyond what texture makes in photographs
-SITE_SPREAD = (0.1, 0.3)  # relative, of k and sigma2: twelve published phones
 LINEAR_SHARE = 0.9  # of the range; brighter blocks are near saturation
 _SIDE = 8
 _MAX_BLOCKS = 40_000  # of one site
@@ -55,10 +52,6 @@ _ROUGHEST = 4.0  # energy of low frequencies over that of noise
 _FIRST_SHARE = 0.05  # of the blocks, the smoothest ones, from which the first line comes
 _ROUNDS = 8
 _SMOOTH_QUANTILE = 0.5
-_REWEIGHTINGS = 12
-_READ_E2 = 4.0  # read noise, electrons squared: sigma2 / k^2, 1.6 to 13 over the built-in profiles at ISO 800
-_LEAST_K = 1e-15  # keeps what is a share of k above 0
-_TEXTURE = 0.08  # of a variance: error that texture makes in an ordinary photograph (bench/blind_noise.py)
 
 
 class NoiselessError(FsidError):
@@ -100,7 +93,7 @@ def contradiction(raw: Raw, level: NoiseLevel) -> float | None:
     variance = lines.sites[:, 0] * light + lines.sites[:, 1]
     # Where k comes out too large, sigma2 comes out too small: together they are off by less than this.
     fit = np.hypot(lines.errors[:, 0] * light, lines.errors[:, 1])
-    times, error = variance.mean() / stated, np.hypot(fit.mean(), _TEXTURE * variance.mean()) / stated
+    times, error = variance.mean() / stated, np.hypot(fit.mean(), TEXTURE * variance.mean()) / stated
     return times if times - 2 * error > UNLIKE or times + 2 * error < 1 / UNLIKE else None
 
 
@@ -120,33 +113,6 @@ class _Blocks:
     site: np.ndarray
     share: float
     lowest: float = -np.inf
-
-
-@dataclass(frozen=True, eq=False)
-class _Pools:
-    """Medians of smooth blocks of one site in one part of the range: mean, variance, and how many independent
-    coefficients stand behind each."""
-
-    mean: np.ndarray
-    variance: np.ndarray
-    freedom: np.ndarray
-    site: np.ndarray
-    part: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
-class _Lines:
-    """k and sigma2: common (2,), from which those of the sites (4, 2) differ; spread (4, 2, n): what
-    each of n independent deviations of one standard error adds to the latter."""
-
-    common: np.ndarray
-    sites: np.ndarray
-    spread: np.ndarray
-
-    @property
-    def errors(self) -> np.ndarray:
-        """(4, 2) standard errors of the sites."""
-        return np.asarray(np.linalg.norm(self.spread, axis=2))
 
 
 _ORDER = np.add.outer(np.arange(_SIDE), np.arange(_SIDE))
@@ -169,12 +135,12 @@ def estimate_noise(raw: Raw) -> NoiseEstimate:
     FsidError: an image without smooth parts, saturated or without noise: nothing to measure.
     """
     pools, lines, floor = _measured(raw)
-    sites = [_physical(pools, number, lines, floor) for number in range(4)]
+    sites = [physical(pools, number, lines, floor) for number in range(4)]
     (k, sigma2), (k_error, sigma2_error) = np.transpose(sites, (1, 2, 0))
     return NoiseEstimate(NoiseLevel(four(k), four(sigma2)), four(k_error), four(sigma2_error))
 
 
-def _measured(raw: Raw) -> tuple[_Pools, _Lines, float]:
+def _measured(raw: Raw) -> tuple[Pools, Lines, float]:
     """The pools of `raw`, the lines through them, and the variance of its rounding. FsidError: as above."""
     span = raw.white_level - raw.black_level
     near_0 = (1 - _NEAR_0 * raw.black_level) / span
@@ -186,10 +152,10 @@ def _measured(raw: Raw) -> tuple[_Pools, _Lines, float]:
             "the image is too small, or saturated or at DN 0 almost everywhere, to tell its noise"
         )
     first = _first_line(blocks, floor)
-    lines = _Lines(first, np.tile(first, (4, 1)), np.zeros((4, 2, 0)))
+    lines = Lines(first, np.tile(first, (4, 1)), np.zeros((4, 2, 0)))
     for _ in range(_ROUNDS):
         pools = _pools(blocks, lines)
-        lines = _fitted(pools, lines, floor)
+        lines = fitted(pools, lines, floor)
     if lines.common[0] == 0 and lines.common[1] <= floor:
         raise NoiselessError("the image holds no noise beyond its rounding; there is nothing to measure")
     light = np.array([np.average(pools.mean.clip(min=0), weights=pools.freedom.clip(min=1e-9)), 1.0])
@@ -246,7 +212,7 @@ def _first_line(blocks: _Blocks, floor: float) -> np.ndarray:
     return np.maximum(line, (0, floor))
 
 
-def _pools(blocks: _Blocks, lines: _Lines) -> _Pools:
+def _pools(blocks: _Blocks, lines: Lines) -> Pools:
     k, sigma2 = lines.sites[blocks.site].T
     expected = k * blocks.mean.clip(min=0) + sigma2
     expected *= _left((blocks.mean - blocks.lowest) / np.sqrt(expected))
@@ -261,7 +227,7 @@ def _pools(blocks: _Blocks, lines: _Lines) -> _Pools:
     mean, variance, size, *where = np.array(rows, np.float64).reshape(-1, 5).T
     freedom = size * blocks.share * _HIGH.sum() * _MEDIAN_EFFICIENCY
     mean, variance, clipped = before_clipping(mean, variance / _HIGH_MEDIAN, blocks.lowest, _NO_WHITE)
-    return _Pools(mean, variance, freedom * (1 - clipped) ** _SEEN, *np.array(where, np.intp))
+    return Pools(mean, variance, freedom * (1 - clipped) ** _SEEN, *np.array(where, np.intp))
 
 
 def _parts_of_like_mean(mean: np.ndarray, roughness: np.ndarray, line: np.ndarray) -> list[np.ndarray]:
@@ -308,60 +274,3 @@ def _smooth(roughness: np.ndarray, least: int) -> np.ndarray:
 def _left(sigmas: np.ndarray) -> np.ndarray:
     """(n,) share of its variance that noise keeps whose mean DN 0 leaves so many sigmas above itself."""
     return np.interp(sigmas, _SIGMAS + _SHIFT, _LEFT)
-
-
-def _fitted(pools: _Pools, before: _Lines, floor: float) -> _Lines:
-    """The lines through `pools`: V = (k + dk) x + sigma2 + dsigma2, dk and dsigma2 of a site being 0 within
-    `SITE_SPREAD` of those `before`. Parts of the range above the lines, which texture lifts, count less."""
-    if pools.mean.size == 0:
-        raise FsidError("the image has no smooth part in which its noise could be seen")
-    light = np.stack([pools.mean.clip(min=0), np.ones_like(pools.mean)], axis=1)
-    design = np.hstack([light, (np.eye(4)[pools.site][:, :, None] * light[:, None]).reshape(-1, 8)])
-    of_site = np.hstack([np.tile(np.eye(2), (4, 1)), np.eye(8)])
-    bounds = (np.array([0.0] * 2 + [-np.inf] * 8), np.full(10, np.inf))
-    spread = np.tile(np.array(SITE_SPREAD) * np.maximum(before.common, (_LEAST_K, floor)), 4)
-    prior = np.hstack([np.zeros((8, 2)), np.diag(1 / spread)])
-    model = np.maximum(pools.variance, floor)
-    root = np.sqrt(pools.freedom / 2) / model
-    for _ in range(_REWEIGHTINGS):
-        rows = np.concatenate([design * root[:, None], prior])
-        unit = 1 / np.linalg.norm(rows, axis=0)  # of variables whose sizes are far apart
-        values = np.concatenate([(pools.variance - floor) * root, np.zeros(8)])
-        found = unit * lsq_linear(rows * unit, values, bounds, method="bvls").x
-        model = np.maximum(design @ found + floor, floor)
-        root = np.sqrt(_weight(pools, model) * pools.freedom / 2) / model
-    scatter = max(1.0, float(np.sum((root * (pools.variance - model)) ** 2) / max(len(model) - 2, 1)))
-    rows = np.concatenate([design * root[:, None] / np.sqrt(scatter), prior])
-    unit = 1 / np.linalg.norm(rows, axis=0)
-    spread = (of_site * unit) @ np.linalg.pinv(rows * unit)
-    zero = np.array([0.0, floor])
-    sites = np.maximum((of_site @ found).reshape(4, 2) + zero, zero)
-    return _Lines(found[:2] + zero, sites, spread.reshape(4, 2, -1))
-
-
-def _weight(pools: _Pools, model: np.ndarray) -> np.ndarray:
-    """(n,) of pools: by how far all pools in the same part of the range together lie above `model`."""
-    freedom = np.bincount(pools.part, pools.freedom).clip(min=1e-9)
-    above = np.bincount(pools.part, pools.freedom * (pools.variance / model - 1)) / freedom
-    z = above / np.sqrt(2 / freedom)
-    return (1 / (1 + (z.clip(min=0) / 2) ** 2))[pools.part]
-
-
-def _physical(pools: _Pools, site: int, lines: _Lines, floor: float) -> tuple[np.ndarray, np.ndarray]:
-    """(k, sigma2) of one site and their errors, with what texture may add at either end of the light seen.
-
-    k is weighed against that of a camera whose read noise is `_READ_E2` and that has the same variance in the
-    mean light of the site, where the image tells it; the square of that k is the variance of this guess.
-    """
-    x = pools.mean.clip(min=0)
-    own = pools.freedom * (pools.site == site)
-    light = float(np.average(x, weights=own if own.any() else np.ones_like(x)))
-    k, sigma2 = lines.sites[site]
-    dark, bright, variance = (k * at + sigma2 for at in (x.min(), x.max(), light))
-    texture = _TEXTURE * np.array([np.hypot(dark, bright) / max(x.max() - x.min(), 1e-9), dark])
-    k_error, sigma2_error = np.hypot(lines.errors[site], texture)
-    usual = (np.sqrt(light**2 + 4 * _READ_E2 * variance) - light) / (2 * _READ_E2)
-    told = usual**2 / (usual**2 + k_error**2)
-    k, k_error = told * k + (1 - told) * usual, np.sqrt(told) * k_error
-    sigma2_error = min(sigma2_error, np.hypot(_TEXTURE * variance, k_error * light))
-    return np.array([k, max(variance - k * light, floor)]), np.array([k_error, sigma2_error])
