@@ -91,9 +91,8 @@ def contradiction(raw: Raw, level: NoiseLevel) -> float | None:
     except FsidError:
         return None
     variance = lines.sites[:, 0] * light + lines.sites[:, 1]
-    # Where k comes out too large, sigma2 comes out too small: together they are off by less than this.
-    fit = np.hypot(lines.errors[:, 0] * light, lines.errors[:, 1])
-    times, error = variance.mean() / stated, np.hypot(fit.mean(), TEXTURE * variance.mean()) / stated
+    fit = np.linalg.norm((lines.spread[:, 0] * light[:, None] + lines.spread[:, 1]).mean(axis=0))
+    times, error = variance.mean() / stated, np.hypot(fit, TEXTURE * variance.mean()) / stated
     return times if times - 2 * error > UNLIKE or times + 2 * error < 1 / UNLIKE else None
 
 
