@@ -119,7 +119,7 @@ def test_bm3d_gets_planes_of_independent_noise_of_the_strength_it_is_told(rng, m
 
 def test_without_a_noise_level_the_classical_denoiser_says_so(rng: np.random.Generator):
     clean = clean_from_photo(rng, data.coffee()[:64, :64].astype(np.float32) / 255, load_profile("pixel6"))
-    with pytest.raises(FsidError, match="noise level is unknown"):
+    with pytest.raises(FsidError, match="noise level of this RAW is unknown"):
         denoise_classical(dataclasses.replace(clean, noise=None))
     denoise_classical(clean, NoiseLevel((1e-3,) * 4, (1e-5,) * 4))
 

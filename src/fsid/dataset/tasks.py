@@ -88,7 +88,9 @@ def scene_config(config: GenerateConfig) -> SceneConfig:
     scene, motion = config.scene, config.scene.motion
     if config.task == "deblur" and motion.exposure_s[1] == 0:
         share = motion.moving_share or MOVING_SHARE
-        return replace(scene, motion=replace(motion, exposure_s=SHUTTER_S, moving_share=share))
+        apart_s = max(motion.interval_s, SHUTTER_S[1])  # no frame follows, which could not begin before
+        motion = replace(motion, interval_s=apart_s, exposure_s=SHUTTER_S, moving_share=share)
+        return replace(scene, motion=motion)
     if config.task == "burst" and motion.frames == 1:
         return replace(scene, motion=replace(motion, frames=BURST_FRAMES))
     return scene
