@@ -69,6 +69,10 @@ CASES = [
     ("generate {0}/out --count 1 --task deblur --set scale=4", "scale: has no effect on --task deblur"),
     ("generate {0}/out --count 1 --set scene.motion.frames=2", "frames: has no effect on --task denoise"),
     ("generate {0}/out --count 1 --task deblur --set scene.motion.frames=2", "frames: has no effect on"),
+    (
+        "generate {0}/out --count 1 --task burst --set scene.motion.exposure_s=[0.01,0.2]",
+        "scene.motion.exposure_s = (0.01, 0.2): frames of a burst",
+    ),
     ("generate {0}/out --count 1 --set scene.motion.moving_share=1", "moving_share: has no effect on"),
     (
         "generate {0}/out --count 1 --renderer reference --quality fast",

@@ -92,7 +92,10 @@ def scene_config(config: GenerateConfig) -> SceneConfig:
         motion = replace(motion, interval_s=apart_s, exposure_s=SHUTTER_S, moving_share=share)
         return replace(scene, motion=motion)
     if config.task == "burst" and motion.frames == 1:
-        return replace(scene, motion=replace(motion, frames=BURST_FRAMES))
+        try:
+            return replace(scene, motion=replace(motion, frames=BURST_FRAMES))
+        except FsidError as error:  # a shutter time that is longer than the frames are apart
+            raise FsidError(f"scene.motion.{error}") from None
     return scene
 
 
