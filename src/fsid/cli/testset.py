@@ -68,7 +68,6 @@ def testset(
     _check_options(source, {"iso": iso, "lux": lux, "material": material}, given)
     if source != "from-bursts":
         camera = camera or "pixel6"
-    lines: list[str] = []
     if source == "simulate":
         with progress_bar("materials", "pictures", quiet=quiet) as progress:
             made = simulated_testset(
@@ -81,11 +80,14 @@ def testset(
                 **given,
             )
     elif source == "from-bursts":
+        lines: list[str] = []
         with progress_bar("bursts", "bursts", quiet=quiet) as progress:
             made, found = burst_testset(
                 folders[0], output, camera=camera, progress=progress, note=lines.append, **given
             )
         print_table(_table(found))
+        for line in lines:
+            note(line)
     else:
         isos = iso if iso or lux else DEFAULT_ISOS
         with progress_bar("photographs", "photographs", quiet=quiet) as progress:
@@ -93,8 +95,6 @@ def testset(
                 folders, output, camera=camera, isos=isos, luxes=lux, progress=progress, **given
             )
         note_unread(folders)  # not before: what is wrong is one line
-    for line in lines:
-        note(line)
     if camera:
         note_files(camera, made.captures(output))
 

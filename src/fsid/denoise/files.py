@@ -238,7 +238,7 @@ def denoise_folder(
     is_new = not target.exists()
     make_folder(target)
     noises: dict[Path, Noise] = {}
-    first = ""
+    why = ""
     try:
         for done, (source, out) in enumerate(zip(paths, targets, strict=True)):
             try:
@@ -260,7 +260,7 @@ def denoise_folder(
                 if failed is not None:
                     failed(error)
                 else:
-                    first = first or f": {error}"
+                    why = why or f": {error}"
             else:
                 denoised(source, noises[source])
             if progress is not None:
@@ -270,5 +270,5 @@ def denoise_folder(
             with contextlib.suppress(OSError):  # something else came to lie in it
                 target.rmdir()
     if failures := len(paths) - len(noises):
-        raise FsidError(f"{failures} of {len(paths)} files could not be denoised{first}")
+        raise FsidError(f"{failures} of {len(paths)} files could not be denoised{why}")
     return noises

@@ -10,9 +10,9 @@ noise is known better after each round. Blocks of like mean are pooled by their 
 above the line count less than those below it: texture that was missed only ever adds.
 
 In the dark a mean says more of its own noise than of light, and blocks sorted by it show too flat a line
-(regression dilution: k 0.05 to 0.5 of itself). So one more coefficient b is taken, whose noise is independent
-of that of the mean and of the same size: blocks are sorted by mean + b, and their light is mean - b, which
-knows nothing of the noise that sorted them.
+(regression dilution: k came out as 0.06 to 0.5 of itself). So one more coefficient b is taken, whose noise is
+independent of that of the mean and of the same size: blocks are sorted by mean + b, and their light is
+mean - b, which knows nothing of the noise that sorted them.
 
 Where noise reaches DN 0 it is cut off there, and all of it where black is stored as 0: mean and variance of a
 pool are then taken back to those before (`stored_noise`), and it counts less the more was cut off.

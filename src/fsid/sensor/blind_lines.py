@@ -25,8 +25,9 @@ _LEAST_K = 1e-15  # keeps what is a share of k above 0
 
 @dataclass(frozen=True, eq=False)
 class Pools:
-    """Medians of smooth blocks of one site in one part of the range: mean, variance, and how many independent
-    coefficients stand behind each."""
+    """Medians of smooth blocks of one site in one part of the range, each (n,): mean, normalised light;
+    variance, of its noise; freedom, how many independent coefficients stand behind it; site, 0..3 for R, Gr,
+    Gb, B; part, number of the part of the range, from dark to light."""
 
     mean: np.ndarray
     variance: np.ndarray
